@@ -1,0 +1,123 @@
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "instance.h"
+#include "model.h"
+
+/* A sum of two moments is compared with a third; see TRIANGLE_SLACK in supervessel/quantities.py. */
+static const double TRIANGLE_SLACK = 2.0 * DBL_EPSILON;
+
+/* Sine of the angle between a port's directions below which alignment says nothing. */
+static const double PARALLEL_LIMIT = 1e-6;
+
+/* Squares of lengths within these bounds neither under- nor overflow. */
+static const double SHORTEST = 1e-100;
+static const double LONGEST = 1e100;
+
+static Status check_mass(Instance *instance, const Variable *variable, const double *mass) {
+    if (*mass >= 0.0) return STATUS_OK;
+    return instance_refuse(instance, "%s = %.10g kg: must be >= 0", variable->name, *mass);
+}
+
+/* Length of the name of a vector without its index. */
+static int group_length(const Variable *element) {
+    return (int)strcspn(element->name, "[");
+}
+
+static Status check_pmi(Instance *instance, const Variable *variable, const double *k) {
+    double small = k[0], middle = k[1], large = k[2];
+    if (large < middle) { const double swap = large; large = middle; middle = swap; }
+    if (middle < small) { const double swap = middle; middle = small; small = swap; }
+    if (large < middle) { const double swap = large; large = middle; middle = swap; }
+    if (small < 0.0)
+        return instance_refuse(instance, "%.*s = (%.10g, %.10g, %.10g) m2: must be >= 0", group_length(variable),
+                               variable->name, k[0], k[1], k[2]);
+    const double excess = large - (small + middle);
+    if (excess <= TRIANGLE_SLACK * large) return STATUS_OK;
+    return instance_refuse(instance,
+                           "%.*s = (%.10g, %.10g, %.10g) m2: %.17g exceeds %.17g + %.17g by %.6g; no rigid body "
+                           "has these moments",
+                           group_length(variable), variable->name, k[0], k[1], k[2], large, small, middle, excess);
+}
+
+/* Scales a vector by a power of two, exactly, so that its square is far from under- and overflow. */
+static double scale_vector(double v[3]) {
+    const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
+    if (largest > 0.0 && (largest < SHORTEST || largest > LONGEST)) {
+        int exponent;
+        frexp(largest, &exponent);
+        for (size_t i = 0; i < 3; i++) v[i] = ldexp(v[i], -exponent);
+    }
+    return largest;
+}
+
+/* Judges direction and alignment, which stand one after the other; p holds them and gets them scaled. */
+static Status check_port(Instance *instance, const Variable *variable, const double *values, double *p) {
+    double *d = p, *a = p + 3;
+    for (size_t i = 0; i < 6; i += 3) {
+        if (scale_vector(p + i) > 0.0) continue;
+        return instance_refuse(instance, "%.*s = (0, 0, 0): must have a length greater than 0",
+                               group_length(&variable[i]), variable[i].name);
+    }
+    const double across[3] = {d[1] * a[2] - d[2] * a[1], d[2] * a[0] - d[0] * a[2], d[0] * a[1] - d[1] * a[0]};
+    const double lengths = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) * sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
+    const double area = sqrt(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]);
+    if (area >= PARALLEL_LIMIT * lengths) return STATUS_OK;
+    return instance_refuse(instance,
+                           "%.*s = (%.10g, %.10g, %.10g): must not be parallel to %.*s = (%.10g, %.10g, %.10g) within "
+                           "%g rad",
+                           group_length(&variable[3]), variable[3].name, values[3], values[4], values[5],
+                           group_length(variable), variable->name, values[0], values[1], values[2], PARALLEL_LIMIT);
+}
+
+static Status check_inputs(Instance *instance) {
+    Status status = STATUS_OK;
+    for (size_t i = 0; i < INPUT_P_COUNT && status == STATUS_OK; i++) {
+        const Variable *variable = &VARIABLES[REFERENCE_P + i];
+        const double *value = &instance->values[REFERENCE_P + i];
+        switch (variable->check) {
+            case CHECK_MASS: status = check_mass(instance, variable, value); break;
+            case CHECK_PMI: status = check_pmi(instance, variable, value); break;
+            case CHECK_PORT: status = check_port(instance, variable, value, &instance->p[i]); break;
+            case CHECK_NONE: break;
+        }
+    }
+    return status;
+}
+
+/* Judges what the inputs make together. */
+static Status check_composite(Instance *instance, const double *c) {
+    if (!(c[COMPOSITE_MASS] > 0.0 && c[COMPOSITE_MASS] <= DBL_MAX))
+        return instance_refuse(instance, "mass = %.10g kg: the total of all vessels must be finite and > 0",
+                               c[COMPOSITE_MASS]);
+    const size_t count = LAW_TURNS ? COMPOSITE_COUNT : COMPOSITE_MARGINS;
+    bool usable = true;
+    for (size_t i = 0; i < count; i++) usable = usable && isfinite(c[i]);
+    for (size_t i = COMPOSITE_MARGINS; i < COMPOSITE_LAW && LAW_TURNS; i++) usable = usable && c[i] > 0.0;
+    if (usable) return STATUS_OK;
+    const double *J = &c[COMPOSITE_INERTIA];
+    return instance_refuse(instance,
+                           "inertia (xx, yy, zz, xy, xz, yz) = (%.10g, %.10g, %.10g, %.10g, %.10g, %.10g) kg.m2: "
+                           "must be finite%s",
+                           J[0], J[1], J[2], J[3], J[4], J[5], LAW_TURNS ? " and positive definite" : "");
+}
+
+Status composite_refresh(Instance *instance) {
+    if (instance->composite_is_current) return STATUS_OK;
+    memcpy(instance->p, &instance->values[REFERENCE_P], INPUT_P_COUNT * sizeof(double));
+    Status status = check_inputs(instance);
+    if (status != STATUS_OK) return status;
+    double c[COMPOSITE_COUNT];
+    instance->arg[0] = instance->p;
+    instance->res[0] = c;
+    composite(instance->arg, instance->res, instance->iw, instance->w, 0);
+    status = check_composite(instance, c);
+    if (status != STATUS_OK) return status;
+    memcpy(instance->c, c, sizeof c);
+    instance->composite_is_current = true;
+    instance->outputs_are_current = false;
+    instance_inform(instance, LOG_COMPOSITE, "composite computed at %.10g s: mass = %.10g kg", instance->time,
+                    c[COMPOSITE_MASS]);
+    return STATUS_OK;
+}

@@ -1,0 +1,74 @@
+/* The functions of FMI 2.0 that belong to capabilities which this FMU does not claim. They exist because
+   importers look them up; each logs one line and returns an error. */
+#include "fmi2Functions.h"
+
+#include "instance.h"
+
+#if defined(__GNUC__)
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#endif
+
+enum { ANY_STATE = INSTANTIATED | INITIALIZATION | STEPPING | TERMINATED };
+
+static fmi2Status unsupported(Instance *instance, const Call *call) {
+    if (!instance || !instance_admits(instance, call)) return fmi2Error;
+    return (fmi2Status)instance_error(instance, "belongs to a capability that this FMU does not have");
+}
+
+/* Every variable is a Real: any reference given to another type's function is wrong. */
+static fmi2Status other_type(Instance *instance, const Call *call, size_t count) {
+    if (!instance || !instance_admits(instance, call)) return fmi2Error;
+    if (count == 0) return fmi2OK;
+    return (fmi2Status)instance_error(instance, "all variables are Real, none has this type");
+}
+
+#define OTHER_TYPES(X) X(Integer) X(Boolean) X(String)
+
+#define DEFINE_ACCESSORS(TYPE)                                                                            \
+    fmi2Status fmi2Get##TYPE(fmi2Component instance, const fmi2ValueReference references[], size_t count, \
+                             fmi2##TYPE values[]) {                                                       \
+        static const Call call = {"fmi2Get" #TYPE, ANY_STATE, STATUS_ERROR};                              \
+        return other_type(instance, &call, count);                                                        \
+    }                                                                                                     \
+    fmi2Status fmi2Set##TYPE(fmi2Component instance, const fmi2ValueReference references[], size_t count, \
+                             const fmi2##TYPE values[]) {                                                 \
+        static const Call call = {"fmi2Set" #TYPE, ANY_STATE, STATUS_ERROR};                              \
+        return other_type(instance, &call, count);                                                        \
+    }
+
+OTHER_TYPES(DEFINE_ACCESSORS)
+
+#define UNSUPPORTED(X)                                                                                          \
+    X(GetFMUstate, (fmi2Component instance, fmi2FMUstate * state))                                              \
+    X(SetFMUstate, (fmi2Component instance, fmi2FMUstate state))                                                \
+    X(FreeFMUstate, (fmi2Component instance, fmi2FMUstate * state))                                             \
+    X(SerializedFMUstateSize, (fmi2Component instance, fmi2FMUstate state, size_t * size))                      \
+    X(SerializeFMUstate, (fmi2Component instance, fmi2FMUstate state, fmi2Byte bytes[], size_t size))           \
+    X(DeSerializeFMUstate, (fmi2Component instance, const fmi2Byte bytes[], size_t size, fmi2FMUstate * state)) \
+    X(GetDirectionalDerivative,                                                                                 \
+      (fmi2Component instance, const fmi2ValueReference unknowns[], size_t unknown_count,                       \
+       const fmi2ValueReference knowns[], size_t known_count, const fmi2Real seed[], fmi2Real sensitivity[]))   \
+    X(EnterEventMode, (fmi2Component instance))                                                                 \
+    X(NewDiscreteStates, (fmi2Component instance, fmi2EventInfo * info))                                        \
+    X(EnterContinuousTimeMode, (fmi2Component instance))                                                        \
+    X(CompletedIntegratorStep, (fmi2Component instance, fmi2Boolean no_set_state_before_now,                    \
+                                fmi2Boolean * enter_event_mode, fmi2Boolean * terminate))                       \
+    X(SetTime, (fmi2Component instance, fmi2Real time))                                                         \
+    X(SetContinuousStates, (fmi2Component instance, const fmi2Real states[], size_t count))                     \
+    X(GetDerivatives, (fmi2Component instance, fmi2Real derivatives[], size_t count))                           \
+    X(GetEventIndicators, (fmi2Component instance, fmi2Real indicators[], size_t count))                        \
+    X(GetContinuousStates, (fmi2Component instance, fmi2Real states[], size_t count))                           \
+    X(GetNominalsOfContinuousStates, (fmi2Component instance, fmi2Real nominals[], size_t count))               \
+    X(SetRealInputDerivatives, (fmi2Component instance, const fmi2ValueReference references[], size_t count,    \
+                                const fmi2Integer orders[], const fmi2Real values[]))                           \
+    X(GetRealOutputDerivatives, (fmi2Component instance, const fmi2ValueReference references[], size_t count,   \
+                                 const fmi2Integer orders[], fmi2Real values[]))                                \
+    X(CancelStep, (fmi2Component instance))
+
+#define DEFINE_UNSUPPORTED(NAME, PARAMETERS)                              \
+    fmi2Status fmi2##NAME PARAMETERS {                                    \
+        static const Call call = {"fmi2" #NAME, ANY_STATE, STATUS_ERROR}; \
+        return unsupported(instance, &call);                              \
+    }
+
+UNSUPPORTED(DEFINE_UNSUPPORTED)

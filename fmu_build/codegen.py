@@ -1,0 +1,129 @@
+"""C that is particular to a scene: the generated equations, the variable table and the scene's numbers."""
+
+import hashlib
+import tempfile
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+
+import casadi as ca
+
+from fmu_build.errors import BuildError
+from fmu_build.table import Entry
+from supervessel.equations import Equations, composite_slices
+from supervessel.scene import Scene
+
+CAUSALITIES = {
+    "independent": "CAUSALITY_INDEPENDENT",
+    "input": "CAUSALITY_INPUT",
+    "parameter": "CAUSALITY_PARAMETER",
+    "output": "CAUSALITY_OUTPUT",
+}
+
+
+def compiled_functions(model: Equations) -> tuple[ca.Function, ...]:
+    """Returns the functions that the FMU calls."""
+    return model.composite, model.longest_step, model.step, model.outputs
+
+
+def model_source(model: Equations) -> str:
+    """Returns model.c: the scene's equations as C functions without external symbols of their own."""
+    options = {"with_export": False, "casadi_int": "int", "verbose": False}
+    generator = ca.CodeGenerator("model.c", options)
+    for function in compiled_functions(model):
+        generator.add(function)
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter("error")
+        generator.generate(f"{folder}/")
+        source = (Path(folder) / "model.c").read_text()
+    if "#error" in source:
+        raise BuildError("the equations hold something that cannot be generated as C")
+    return '#include "model.h"\n\n' + source
+
+
+def scene_header(scene: Scene, model: Equations, entries: Sequence[Entry]) -> str:
+    """Returns scene.h: counts, places and limits of the scene."""
+    where = composite_slices()
+    references = {entry.variable.name: entry.reference for entry in entries}
+    p_count, u_count = len(model.p_names), len(model.u_names)
+    sizes = [(f.sz_arg(), f.sz_res(), f.sz_iw(), f.sz_w()) for f in compiled_functions(model)]
+    arg, res, iw, w = (max(1, *column) for column in zip(*sizes, strict=True))
+    constants = {
+        "VARIABLE_COUNT": len(entries),
+        "INPUT_P_COUNT": p_count,
+        "REFERENCE_P": 1,
+        "REFERENCE_TORQUE": 1 + p_count,
+        "REFERENCE_RATE_START": references["angular_velocity_start[1]"],
+        "REFERENCE_ATTITUDE_START": references["attitude_start[1]"],
+        "REFERENCE_OUTPUTS": 1 + p_count + u_count + 7,
+        "STATE_COUNT": len(model.x_names),
+        "COMPOSITE_COUNT": model.composite.numel_out(0),
+        "COMPOSITE_MASS": where["mass"].start,
+        "COMPOSITE_INERTIA": where["inertia"].start,
+        "COMPOSITE_MARGINS": where["margins"].start,
+        "COMPOSITE_LAW": where["law"].start,
+        "LAW_TURNS": int(scene.rotation.law != "none"),
+        "WORK_ARG": arg,
+        "WORK_RES": res,
+        "WORK_INT": iw,
+        "WORK_REAL": w,
+    }
+    lines = "\n".join(f"    {name} = {value}," for name, value in constants.items())
+    return (
+        "/* Generated: what the C layer must know of the scene. */\n"
+        "#ifndef SCENE_H\n#define SCENE_H\n\n"
+        f"enum {{\n{lines}\n}};\n\n"
+        "/* Largest angle of a sub-step [rad]. */\n"
+        f"#define MAX_ANGLE_STEP {scene.rotation.max_angle_step!r}\n\n"
+        "#endif\n"
+    )
+
+
+def scene_source(entries: Sequence[Entry], shaping: frozenset[int], token: str) -> str:
+    """Returns scene.c: the variable table with start values, and the token.
+
+    shaping : references of the composite's inputs
+    """
+    rows = "\n".join(f"    {_row(entry, shaping)}," for entry in entries)
+    return (
+        "/* Generated: the scene's variables, by value reference. */\n"
+        '#include "variables.h"\n\n'
+        f"const Variable VARIABLES[VARIABLE_COUNT] = {{\n{rows}\n}};\n\n"
+        f'const char MODEL_TOKEN[] = "{token}";\n'
+    )
+
+
+def _row(entry: Entry, shaping: frozenset[int]) -> str:
+    variable = entry.variable
+    shapes = entry.reference in shaping or not shaping.isdisjoint(entry.dependencies)
+    fields = [
+        f'"{variable.name}"',
+        f'"{variable.unit}"',
+        repr(variable.start or 0.0),
+        CAUSALITIES[entry.causality],
+        _check(entry),
+        "true" if shapes else "false",
+    ]
+    return "{" + ", ".join(fields) + "}"
+
+
+def _check(entry: Entry) -> str:
+    """Returns which check stands at a variable: at the first of those that are judged together."""
+    if entry.causality == "input":
+        for ending, check in (
+            (".mass", "CHECK_MASS"),
+            (".pmi[1]", "CHECK_PMI"),
+            (".direction[1]", "CHECK_PORT"),
+        ):
+            if entry.variable.name.endswith(ending):
+                return check
+    return "CHECK_NONE"
+
+
+def digest(*texts: str | bytes) -> str:
+    """Returns a token for these texts: it changes exactly when one of them does."""
+    together = hashlib.sha256()
+    for text in texts:
+        raw = text.encode() if isinstance(text, str) else text
+        together.update(len(raw).to_bytes(8, "little") + raw)
+    return "{" + together.hexdigest() + "}"

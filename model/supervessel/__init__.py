@@ -1,0 +1,9 @@
+"""Rotation of docked spacecraft: scene schema, symbolic model, numpy reference and CasADi twin."""
+
+from supervessel import reference
+from supervessel.loading import load_scene, parse_scene
+from supervessel.problems import SceneError
+from supervessel.scene import Scene
+from supervessel.twin import Twin
+
+__all__ = ["Scene", "SceneError", "Twin", "load_scene", "parse_scene", "reference"]

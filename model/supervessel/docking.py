@@ -1,0 +1,122 @@
+"""Docking geometry in CasADi symbols: port frames, mating, and the bodies of a scene in the root's axes."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from supervessel.assembly import Joint, joints
+from supervessel.inertia import Body, congruence, join
+from supervessel.scene import Scene
+
+Lookup = Callable[[str, object], ca.SX]
+"""Takes an input's name without index and the scene's value; returns the symbols, or the value as a constant."""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where a frame stands: rotation (3, 3) out of it and its origin (3,) [m], both in outer axes."""
+
+    rotation: ca.SX
+    origin: ca.SX
+
+    def then(self, inner: "Pose") -> "Pose":
+        """Returns the pose, in these outer axes, of a frame whose pose is known in this one."""
+        return Pose(self.rotation @ inner.rotation, self.origin + self.rotation @ inner.origin)
+
+
+def port_axes(direction: ca.SX, alignment: ca.SX) -> ca.SX:
+    """Returns the orthonormal columns (d, a, d x a), (3, 3), of a port, vessel axes.
+
+    direction : (3,), kept but for its length
+    alignment : (3,), projected onto the plane across direction
+    Both of any length > 0 whose square neither under- nor overflows, not parallel. The projection is
+    (d x alignment) x d, which is perpendicular to d to rounding even where the two are nearly parallel.
+    """
+    d = direction / ca.sqrt(ca.sumsqr(direction))
+    across = ca.cross(ca.cross(d, alignment), d)
+    a = across / ca.sqrt(ca.sumsqr(across))
+    return ca.horzcat(d, a, ca.cross(d, a))
+
+
+def mated_pose(parent: tuple[ca.SX, ca.SX], child: tuple[ca.SX, ca.SX]) -> Pose:
+    """Returns the pose of the child vessel in the parent's axes.
+
+    parent, child : position (3,) [m] and axes (3, 3) of the mated ports, each in its own vessel's axes
+    Source: [CV] eqs. (8), (9): R d_child = -d_parent, R a_child = a_parent, ports at one point.
+    """
+    (position_parent, axes_parent), (position_child, axes_child) = parent, child
+    facing = ca.horzcat(-axes_parent[:, 0], axes_parent[:, 1], -axes_parent[:, 2])
+    rotation = facing @ axes_child.T
+    return Pose(rotation, position_parent - rotation @ position_child)
+
+
+def composite_body(scene: Scene, lookup: Lookup) -> Body:
+    """Returns the whole assembly as one body in the root vessel's axes.
+
+    Vessels that no pose input separates form a rigid group: they are joined in the axes of the group's
+    first vessel, those of constant mass first, so that all that is constant has become numbers before
+    the group is placed by the pose that moves it.
+    """
+    groups = {scene.root: scene.root}
+    inside = {scene.root: Pose(_constant(np.eye(3)), _constant(np.zeros(3)))}
+    placed = {scene.root: inside[scene.root]}
+    moving = set(scene.inputs.pose)
+    for joint in joints(scene):
+        pose = inside[joint.parent].then(_joint_pose(scene, joint, lookup))
+        if moving.intersection(joint.ports):
+            groups[joint.child] = joint.child
+            placed[joint.child] = placed[groups[joint.parent]].then(pose)
+            inside[joint.child] = inside[scene.root]
+        else:
+            groups[joint.child] = groups[joint.parent]
+            inside[joint.child] = pose
+    bodies = []
+    for group, pose in placed.items():
+        members = [vessel for vessel in inside if groups[vessel] == group]
+        body = _joined([_vessel_body(scene, vessel, lookup, inside[vessel]) for vessel in members])
+        bodies.append(body if group == scene.root else body.seen_from(pose.rotation, pose.origin))
+    return _joined(bodies)
+
+
+def _constant(value: object) -> ca.SX:
+    return ca.densify(ca.SX(ca.DM(value)))
+
+
+def _joint_pose(scene: Scene, joint: Joint, lookup: Lookup) -> Pose:
+    """Returns the child's pose in the parent's axes."""
+    parent, child = (_port(scene, name, lookup) for name in joint.ports)
+    return mated_pose(parent, child)
+
+
+def _port(scene: Scene, name: str, lookup: Lookup) -> tuple[ca.SX, ca.SX]:
+    """Returns position and axes of a port in its vessel's axes."""
+    port = scene.port(name)
+    position, direction, alignment = (
+        lookup(f"{name}.{key}", getattr(port, key)) for key in ("position", "direction", "alignment")
+    )
+    return position, port_axes(direction, alignment)
+
+
+def _vessel_body(scene: Scene, name: str, lookup: Lookup, pose: Pose) -> Body:
+    """Returns a vessel as a body in the axes of its group."""
+    vessel = scene.vessels[name]
+    mass = lookup(f"{name}.mass", vessel.mass)
+    if vessel.pmi is not None:
+        specific_inertia = ca.diag(lookup(f"{name}.pmi", vessel.pmi))
+    else:
+        specific_inertia = _constant(vessel.specific_inertia)
+    centre = _constant(vessel.centre_of_mass)
+    specific = congruence(pose.rotation, specific_inertia)
+    return Body(mass, pose.origin + pose.rotation @ centre, mass * specific)
+
+
+def _joined(bodies: list[Body]) -> Body:
+    """Returns bodies seen from the same axes as one, constants before what may change, heaviest first."""
+    constants = [body for body in bodies if body.mass.is_constant()]
+    constants.sort(key=lambda body: -float(body.mass))
+    whole, *others = constants + [body for body in bodies if not body.mass.is_constant()]
+    for body in others:
+        whole = join(whole, body)
+    return whole

@@ -1,0 +1,176 @@
+"""Names in a scene: that they exist, that they are written right, and that the docks make one tree.
+
+Works on the raw tables of a file, so that a wrong name is reported beside a wrong number.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from supervessel.problems import quantity, unknown
+from supervessel.scene import OUTPUT_NAMES, input_groups
+
+IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+MODEL_NAME = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*_?")
+RESERVED = frozenset(
+    (
+        *OUTPUT_NAMES,
+        "time",
+        "state",
+        "der",
+        "torque",
+        "force",
+        "docked",
+        "velocity",
+        "rate",
+        "principal_moments",
+        "principal_axes",
+        "error_estimate",
+        "angular_velocity_start",
+        "attitude_start",
+    )
+)
+"""Names of the FMU's own variables, and those it will have: no vessel or port can take them."""
+
+
+def naming_problems(raw: Mapping[str, Any]) -> list[str]:
+    """Returns what is wrong with the names of a scene, given as the raw tables of its file."""
+    ports = _ports(raw)
+    return [
+        *_model_name(raw),
+        *_identifiers(ports),
+        *_docks(raw, ports),
+        *_inputs(raw, ports),
+        *_ranges(raw),
+        *_outputs(raw),
+    ]
+
+
+def _table(raw: Any, key: str) -> Mapping[str, Any]:
+    """Returns a table, or an empty one where the file has something else there (reported elsewhere)."""
+    value = raw.get(key) if isinstance(raw, Mapping) else None
+    return value if isinstance(value, Mapping) else {}
+
+
+def _list(raw: Any, key: str) -> list[Any]:
+    value = raw.get(key) if isinstance(raw, Mapping) else None
+    return list(value) if isinstance(value, list | tuple) else []
+
+
+def _ports(raw: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Returns the names of the ports of each vessel."""
+    return {vessel: list(_table(table, "ports")) for vessel, table in _table(raw, "vessels").items()}
+
+
+def _model_name(raw: Mapping[str, Any]) -> Iterator[str]:
+    name = raw.get("name")
+    if isinstance(name, str) and not MODEL_NAME.fullmatch(name):
+        yield f'name = "{name}": must be a letter, then letters, digits and single underscores'
+
+
+def _identifiers(ports: Mapping[str, list[str]]) -> Iterator[str]:
+    if not ports:
+        yield "vessels: at least one vessel is needed"
+    places = [("vessels", vessel) for vessel in ports]
+    places += [(f"vessels.{vessel}.ports", port) for vessel, names in ports.items() for port in names]
+    for place, name in places:
+        if not IDENTIFIER.fullmatch(name):
+            yield f'{place}: name "{name}" must be a letter or underscore, then letters, digits, underscores'
+        elif name in RESERVED:
+            yield f'{place}: name "{name}" is reserved for a variable of the FMU'
+
+
+def _port_problem(name: object, ports: Mapping[str, list[str]]) -> str:
+    """Returns why `name` is no port of the scene, or "" if it is one."""
+    if not isinstance(name, str) or name.count(".") != 1:
+        return f'{quantity(name)} must be a port, written "vessel.port"'
+    vessel, port = name.split(".")
+    if vessel not in ports:
+        return unknown("vessel", vessel, ports)
+    if port not in ports[vessel]:
+        return unknown(f"port of {vessel}", port, ports[vessel])
+    return ""
+
+
+def _docks(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[str]:
+    """Yields what keeps the docks from making a tree that reaches every vessel from the root."""
+    component = {vessel: vessel for vessel in ports}
+    taken: dict[str, str] = {}
+    complete = True
+    for number, dock in enumerate(_list(raw, "docks"), start=1):
+        place = f"docks[{number}].ports"
+        names = _list(dock, "ports")
+        if len(names) != 2:
+            complete = False
+            if isinstance(dock, Mapping) and "ports" in dock:
+                yield f'{place} = {quantity(dock["ports"])}: must be two ports, written "vessel.port"'
+            continue
+        problems = [problem for name in names if (problem := _port_problem(name, ports))]
+        yield from (f"{place}: {problem}" for problem in problems)
+        yield from (
+            f"{place}: port {name} is docked already, in {taken[name]}" for name in set(names) & set(taken)
+        )
+        taken |= {name: f"docks[{number}]" for name in names if isinstance(name, str)}
+        vessels = [str(name).partition(".")[0] for name in names]
+        if not all(vessel in ports for vessel in vessels):
+            complete = False
+        elif vessels[0] == vessels[1]:
+            yield f"{place}: both ports belong to {vessels[0]}; a dock joins two vessels"
+        elif component[vessels[0]] == component[vessels[1]]:
+            yield f"{place}: {names[0]} - {names[1]} closes a loop; {' and '.join(vessels)} are joined already"
+        else:
+            joined = component[vessels[1]]
+            component |= {v: component[vessels[0]] for v, c in component.items() if c == joined}
+    yield from _root(raw, component if complete else {}, ports)
+
+
+def _root(raw: Mapping[str, Any], component: Mapping[str, str], ports: Mapping[str, list[str]]) -> Iterator[str]:
+    root = raw.get("root")
+    if not isinstance(root, str):
+        return
+    if root not in ports:
+        yield f"root: {unknown('vessel', root, ports)}"
+        return
+    for vessel, part in component.items():
+        if part != component[root]:
+            yield f"vessels.{vessel}: is not reached from the root {root} by docks"
+
+
+def _inputs(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[str]:
+    inputs = _table(raw, "inputs")
+    docked = {name for dock in _list(raw, "docks") for name in _list(dock, "ports") if isinstance(name, str)}
+    for key in ("mass", "pmi", "pose"):
+        names = [name for name in _list(inputs, key) if isinstance(name, str)]
+        place = f"inputs.{key}"
+        for name in sorted({name for name in names if names.count(name) > 1}):
+            yield f"{place}: {name} is listed {names.count(name)} times"
+        for name in dict.fromkeys(names):
+            if key == "pose":
+                problem = _port_problem(name, ports)
+                if problem:
+                    yield f"{place}: {problem}"
+                elif name not in docked:
+                    yield f"{place}: {name} is not docked; its pose would change nothing"
+            elif name not in ports:
+                yield f"{place}: {unknown('vessel', name, ports)}"
+            elif key == "pmi" and "inertia" in _table(_table(raw, "vessels"), name):
+                yield f"{place}: {name} is given by inertia; only a vessel given by pmi has this input"
+
+
+def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:
+    inputs = _table(raw, "inputs")
+    mass, pmi, pose = (_list(inputs, key) for key in ("mass", "pmi", "pose"))
+    groups = input_groups(mass, pmi, pose, inputs.get("torque") is True)
+    known = list(groups) + [f"{name}[{i}]" for name, size in groups.items() for i in range(1, size + 1)]
+    for name in _table(inputs, "range"):
+        if name not in known:
+            yield f"inputs.range: {unknown('input', name, known)}"
+
+
+def _outputs(raw: Mapping[str, Any]) -> Iterator[str]:
+    names = [name for name in _list(_table(raw, "outputs"), "names") if isinstance(name, str)]
+    for name in sorted({name for name in names if names.count(name) > 1}):
+        yield f"outputs.names: {name} is listed {names.count(name)} times"
+    for name in dict.fromkeys(names):
+        if name not in OUTPUT_NAMES:
+            yield f"outputs.names: {unknown('output', name, OUTPUT_NAMES)}"

@@ -1,0 +1,173 @@
+"""Numbers as a scene may write them, and the inequalities that a mass distribution obeys."""
+
+import math
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator
+
+from supervessel.problems import quantity
+
+Vector = tuple[float, float, float]
+Matrix = tuple[Vector, Vector, Vector]
+
+EPSILON = 2.0**-52
+# k1 + k2 >= k3 is judged on decimals read from text: each is off by u = EPSILON/2 relative, the sum by one
+# u more, so a body on the boundary shows an excess of up to 4 u k3.
+TRIANGLE_SLACK = 2.0 * EPSILON
+# Eigenvalues of a symmetric 3x3 matrix are computed to a few u of the largest one.
+EIGENVALUE_SLACK = 16.0 * EPSILON
+# A pivot of L D L^T is its diagonal element less what the other rows take; each of the few operations
+# rounds by up to u of that element.
+PIVOT_SLACK = 8.0 * EPSILON
+
+
+def _is_number(value: object) -> bool:
+    """Whether `value` is an integer or float (not a Boolean) that a double holds as a finite number."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        return math.isfinite(float(value))
+    except OverflowError:
+        return False
+
+
+def number(unit: str, allowed: str, low: float = -math.inf, *, open_low: bool = False) -> BeforeValidator:
+    """Returns a pydantic validator for one finite number above (or at) `low`; `allowed` says so in words."""
+
+    def check(value: object) -> float:
+        if _is_number(value):
+            x = float(value)  # type: ignore[arg-type]
+            if x > low or (x == low and not open_low):
+                return x
+        raise ValueError(f" = {quantity(value, unit)}: must be {allowed}")
+
+    return BeforeValidator(check)
+
+
+def vector(unit: str, allowed: str, size: int = 3, low: float = -math.inf) -> BeforeValidator:
+    """Returns a pydantic validator for `size` finite numbers >= `low`; `allowed` says so in words."""
+
+    def check(value: object) -> tuple[float, ...]:
+        if (
+            isinstance(value, list | tuple)
+            and len(value) == size
+            and all(_is_number(element) and float(element) >= low for element in value)
+        ):
+            return tuple(float(element) for element in value)
+        raise ValueError(f" = {quantity(value, unit)}: must be {allowed}")
+
+    return BeforeValidator(check)
+
+
+def _tensor(value: object) -> Matrix:
+    unit = "kg m2"
+    where = f" = {quantity(value, unit)}: "
+    if not (
+        isinstance(value, list | tuple)
+        and len(value) == 3
+        and all(
+            isinstance(row, list | tuple) and len(row) == 3 and all(_is_number(x) for x in row) for row in value
+        )
+    ):
+        raise ValueError(where + "must be three rows of three finite numbers")
+    tensor = np.array(value, dtype=float)
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        if tensor[i, j] != tensor[j, i]:
+            raise ValueError(
+                f"{where}must be symmetric, but [{i + 1},{j + 1}] = {tensor[i, j]} and [{j + 1},{i + 1}] = {tensor[j, i]}"
+            )
+    problem = tensor_problem(tensor)
+    if problem:
+        raise ValueError(where + problem)
+    return tuple(tuple(row) for row in tensor.tolist())
+
+
+def triangle_problem(moments: Vector) -> str:
+    """Returns why no rigid body has these three moments of inertia (any unit), or "" if one may.
+
+    Source: [CV] eqs. (3-5): the squares of the sample points' distances must not be negative.
+    """
+    small, middle, large = sorted(moments)
+    excess = large - (small + middle)
+    if excess <= TRIANGLE_SLACK * large:
+        return ""
+    return f"{large:.17g} exceeds {small:.17g} + {middle:.17g} by {excess:.6g}; no rigid body has these moments"
+
+
+def tensor_problem(tensor: NDArray[np.float64]) -> str:
+    """Returns why no rigid body has this inertia tensor, (3, 3) [kg m2], symmetric, or "" if one may."""
+    moments = np.linalg.eigvalsh(tensor)
+    slack = EIGENVALUE_SLACK * float(np.abs(moments).max())
+    three = ", ".join(f"{moment:.10g}" for moment in moments)
+    if moments[0] < -slack:
+        return f"must be positive semidefinite, but its principal moments are {three} kg m2"
+    excess = moments[2] - (moments[0] + moments[1])
+    if excess > slack:
+        return (
+            f"its principal moments are {three} kg m2: {moments[2]:.10g} exceeds {moments[0]:.10g} + {moments[1]:.10g} "
+            f"by {excess:.6g}; no rigid body has these moments"
+        )
+    return ""
+
+
+def definite_problem(tensor: NDArray[np.float64]) -> str:
+    """Returns why Euler's equations cannot be solved with this tensor, (3, 3) [kg m2], or "" if they can.
+
+    A pivot of the L D L^T factorisation that is lost in the rounding of its own diagonal element means
+    that the tensor is singular as far as doubles can tell; the generated model applies the same test.
+    """
+    pivots, diagonal = ldl_pivots(tensor), np.diag(tensor)
+    if np.all(np.isfinite(pivots)) and np.all(pivots > PIVOT_SLACK * diagonal):
+        return ""
+    moments = np.linalg.eigvalsh(tensor) if np.all(np.isfinite(tensor)) else np.diag(tensor)
+    three = ", ".join(f"{moment:.10g}" for moment in moments)
+    return f"principal moments {three} kg m2: must be positive and finite"
+
+
+def ldl_pivots(tensor: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns D of J = L D L^T, (3,), for a symmetric (3, 3) tensor; not finite where a pivot is zero."""
+    with np.errstate(all="ignore"):
+        l21, l31 = tensor[0, 1] / tensor[0, 0], tensor[0, 2] / tensor[0, 0]
+        d2 = tensor[1, 1] - l21 * tensor[0, 1]
+        l32 = (tensor[1, 2] - l31 * tensor[0, 1]) / d2
+        d3 = tensor[2, 2] - l31 * tensor[0, 2] - l32 * (tensor[1, 2] - l31 * tensor[0, 1])
+    return np.array([tensor[0, 0], d2, d3])
+
+
+def _pmi(value: Any) -> Vector:
+    problem = triangle_problem(value)
+    if problem:
+        raise ValueError(f" = {quantity(value, 'm2')}: {problem}")
+    return tuple(value)  # type: ignore[return-value]
+
+
+Mass = Annotated[float, number("kg", "a finite number >= 0", 0.0)]
+Pmi = Annotated[
+    Vector, BeforeValidator(_pmi), vector("m2", "three finite numbers >= 0", low=0.0)
+]  # validators run from the right
+Tensor = Annotated[Matrix, BeforeValidator(_tensor)]
+Position = Annotated[Vector, vector("m", "three finite numbers")]
+Direction = Annotated[Vector, vector("", "three finite numbers, a direction of any length > 0")]
+AngularVelocity = Annotated[Vector, vector("rad/s", "three finite numbers")]
+Seconds = Annotated[float, number("s", "a finite number > 0", 0.0, open_low=True)]
+Angle = Annotated[float, number("rad", "a finite number > 0", 0.0, open_low=True)]
+Tolerance = Annotated[float, number("", "a finite number > 0", 0.0, open_low=True)]
+Bounds = Annotated[tuple[float, float], vector("", "two finite numbers [low, high]", size=2)]
+
+
+def _attitude(value: Any) -> tuple[float, float, float, float]:
+    scale = max(abs(component) for component in value)
+    if scale == 0.0:
+        raise ValueError(f" = {quantity(value)}: must have a length greater than 0")
+    scaled = [component / scale for component in value]
+    norm = math.sqrt(math.fsum(component * component for component in scaled))
+    return tuple(component / norm for component in scaled)  # type: ignore[return-value]
+
+
+Attitude = Annotated[
+    tuple[float, float, float, float],
+    BeforeValidator(_attitude),
+    vector("", "four finite numbers [w, x, y, z]", size=4),
+]
