@@ -60,7 +60,10 @@ def generate(scene: Scene, fmi: int) -> tuple[dict[str, str], bytes]:
     }
     layer = [path.read_bytes() for path in sorted(LAYER.glob("*.[ch]"))]
     token = digest(
-        *sources.values(), scene_source(entries, shaping, ""), model_description(scene, entries, "", fmi), *layer
+        *sources.values(),
+        scene_source(entries, shaping, ""),
+        model_description(scene, entries, "", fmi),
+        *layer,
     )
     sources["scene.c"] = scene_source(entries, shaping, token)
     return sources, model_description(scene, entries, token, fmi)
@@ -93,15 +96,15 @@ def _check_output(output: Path) -> None:
 
 def _write_archive(content: Mapping[str, bytes], output: Path) -> None:
     """Writes a zip archive with the same bytes for the same content; the file appears when it is whole."""
+    part = output.with_name(f"{output.name}.part")
     try:
-        with tempfile.NamedTemporaryFile(dir=output.parent, suffix=".part", delete=False) as part:
-            with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
-                for name in sorted(content):
-                    info = zipfile.ZipInfo(name, ARCHIVE_TIME)
-                    info.compress_type = zipfile.ZIP_DEFLATED
-                    info.external_attr = 0o644 << 16
-                    archive.writestr(info, content[name])
-        Path(part.name).chmod(0o644)
-        Path(part.name).replace(output)
+        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name in sorted(content):
+                info = zipfile.ZipInfo(name, ARCHIVE_TIME)
+                info.compress_type = zipfile.ZIP_DEFLATED
+                info.external_attr = 0o644 << 16
+                archive.writestr(info, content[name])
+        part.replace(output)
     except OSError as error:
+        part.unlink(missing_ok=True)
         raise BuildError(f"{output}: cannot be written: {error.strerror}") from None

@@ -28,8 +28,7 @@ def compiled_functions(model: Equations) -> tuple[ca.Function, ...]:
 
 def model_source(model: Equations) -> str:
     """Returns model.c: the scene's equations as C functions without external symbols of their own."""
-    options = {"with_export": False, "casadi_int": "int", "verbose": False}
-    generator = ca.CodeGenerator("model.c", options)
+    generator = ca.CodeGenerator("model.c", {"with_export": False, "casadi_int": "int", "verbose": False})
     for function in compiled_functions(model):
         generator.add(function)
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():

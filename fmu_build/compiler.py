@@ -69,7 +69,11 @@ def fmi_headers() -> Path:
 
 
 def compile_library(
-    sources: Sequence[Path], include: Sequence[Path], platform: Platform, output: Path, flags: Sequence[str] = FLAGS
+    sources: Sequence[Path],
+    include: Sequence[Path],
+    platform: Platform,
+    output: Path,
+    flags: Sequence[str] = FLAGS,
 ) -> None:
     """Compiles C sources into the shared library `output`.
 

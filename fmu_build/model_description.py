@@ -41,27 +41,29 @@ def model_description(scene: Scene, entries: Sequence[Entry], token: str, fmi: i
     return text + b"\n"
 
 
-def _header(scene: Scene, fmi_version: str, **more: str) -> ET.Element:
+def _header(scene: Scene, fmi_version: str, token_attribute: str, token: str) -> ET.Element:
     """Returns the root element."""
-    return ET.Element(
-        "fmiModelDescription",
-        fmiVersion=fmi_version,
-        modelName=scene.name,
-        description=_description(scene),
-        generationTool=f"supervessel {version('supervessel')}",
-        variableNamingConvention="structured",
-        **more,
-    )
+    attributes = {
+        "fmiVersion": fmi_version,
+        "modelName": scene.name,
+        token_attribute: token,
+        "description": _description(scene),
+        "generationTool": f"supervessel {version('supervessel')}",
+        "variableNamingConvention": "structured",
+    }
+    return ET.Element("fmiModelDescription", attributes)
 
 
 def _description(scene: Scene) -> str:
     others = [name for name in scene.vessels if name != scene.root]
-    docked = f" with {', '.join(others[:8])}{' and others' if len(others) > 8 else ''} docked" if others else ""
+    docked = (
+        f" with {', '.join(others[:8])}{' and others' if len(others) > 8 else ''} docked" if others else ""
+    )
     return f"Rotation of {scene.root}{docked}, law {scene.rotation.law}"
 
 
 def _fmi3(scene: Scene, entries: Sequence[Entry], token: str) -> ET.Element:
-    root = _header(scene, "3.0", instantiationToken=token)
+    root = _header(scene, "3.0", "instantiationToken", token)
     ET.SubElement(
         root, "CoSimulation", modelIdentifier=scene.name, canHandleVariableCommunicationStepSize="true"
     )
@@ -86,7 +88,7 @@ def _fmi3(scene: Scene, entries: Sequence[Entry], token: str) -> ET.Element:
 
 
 def _fmi2(scene: Scene, entries: Sequence[Entry], token: str) -> ET.Element:
-    root = _header(scene, "2.0", guid=token)
+    root = _header(scene, "2.0", "guid", token)
     ET.SubElement(
         root,
         "CoSimulation",

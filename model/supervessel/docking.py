@@ -5,13 +5,14 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 
 from supervessel.assembly import Joint, joints
 from supervessel.inertia import Body, congruence, join
 from supervessel.scene import Scene
 
-Lookup = Callable[[str, object], ca.SX]
-"""Takes an input's name without index and the scene's value; returns the symbols, or the value as a constant."""
+Lookup = Callable[[str, ArrayLike], ca.SX]
+"""Takes an input's name without index and the scene's value; returns its symbols, or the constant."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ def composite_body(scene: Scene, lookup: Lookup) -> Body:
     the group is placed by the pose that moves it.
     """
     groups = {scene.root: scene.root}
-    inside = {scene.root: Pose(_constant(np.eye(3)), _constant(np.zeros(3)))}
+    inside = {scene.root: Pose(constant(np.eye(3)), constant(np.zeros(3)))}
     placed = {scene.root: inside[scene.root]}
     moving = set(scene.inputs.pose)
     for joint in joints(scene):
@@ -80,8 +81,8 @@ def composite_body(scene: Scene, lookup: Lookup) -> Body:
     return _joined(bodies)
 
 
-def _constant(value: object) -> ca.SX:
-    return ca.densify(ca.SX(ca.DM(value)))
+def constant(value: ArrayLike) -> ca.SX:
+    return ca.densify(ca.SX(ca.DM(np.asarray(value, dtype=float))))
 
 
 def _joint_pose(scene: Scene, joint: Joint, lookup: Lookup) -> Pose:
@@ -106,8 +107,8 @@ def _vessel_body(scene: Scene, name: str, lookup: Lookup, pose: Pose) -> Body:
     if vessel.pmi is not None:
         specific_inertia = ca.diag(lookup(f"{name}.pmi", vessel.pmi))
     else:
-        specific_inertia = _constant(vessel.specific_inertia)
-    centre = _constant(vessel.centre_of_mass)
+        specific_inertia = constant(vessel.specific_inertia)
+    centre = constant(vessel.centre_of_mass)
     specific = congruence(pose.rotation, specific_inertia)
     return Body(mass, pose.origin + pose.rotation @ centre, mass * specific)
 

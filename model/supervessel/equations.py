@@ -9,9 +9,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
+from numpy.typing import ArrayLike
 
 from supervessel.attitude import attitude_dot, to_inertial
-from supervessel.docking import composite_body
+from supervessel.docking import composite_body, constant
 from supervessel.inertia import ldl, symmetric
 from supervessel.propagators import longest_step, rk4_step
 from supervessel.quantities import PIVOT_SLACK
@@ -104,12 +105,12 @@ def _composite(scene: Scene, names: tuple[str, ...], p: ca.SX, prepare: Callable
     """Returns c as an expression of p."""
     symbols = dict(zip(names, ca.vertsplit(p), strict=True)) if names else {}
 
-    def lookup(group: str, value: object) -> ca.SX:
+    def lookup(group: str, value: ArrayLike) -> ca.SX:
         if group in symbols:
             return symbols[group]
         if f"{group}[1]" in symbols:
             return ca.vertcat(*(symbols[f"{group}[{i}]"] for i in (1, 2, 3)))
-        return ca.densify(ca.SX(ca.DM(value)))
+        return constant(value)
 
     body = composite_body(scene, lookup)
     J = body.inertia

@@ -3,6 +3,7 @@
 What is constant folds to numbers as it is built; a tensor's two triangles share their symbols.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
@@ -33,15 +34,15 @@ class Body:
 def congruence(rotation: ca.SX, inertia: ca.SX) -> ca.SX:
     """Returns R J R^T, (3, 3), exactly symmetric, for a symmetric J."""
     half = rotation @ inertia
-    return symmetric(lambda i, j: sum(half[i, k] * rotation[j, k] for k in range(3)))
+    return symmetric(lambda i, j: ca.dot(half[i, :], rotation[j, :]))
 
 
-def symmetric(element: object) -> ca.SX:
+def symmetric(element: Callable[[int, int], ca.SX]) -> ca.SX:
     """Returns the symmetric (3, 3) matrix whose upper triangle is `element(i, j)`, i <= j."""
     matrix = ca.SX(3, 3)
     for i in range(3):
         for j in range(i, 3):
-            matrix[i, j] = matrix[j, i] = element(i, j)  # type: ignore[operator]
+            matrix[i, j] = matrix[j, i] = element(i, j)
     return ca.densify(matrix)
 
 
@@ -82,8 +83,8 @@ def _offset_square(d: ca.SX, i: int, j: int) -> ca.SX:
     """Returns element (i, j) of |d|^2 E - d d^T without subtracting squares."""
     if i != j:
         return -d[i] * d[j]
-    others = [k for k in range(3) if k != i]
-    return sum(d[k] * d[k] for k in others)
+    one, other = (k for k in range(3) if k != i)
+    return d[one] * d[one] + d[other] * d[other]
 
 
 def ldl(inertia: ca.SX) -> tuple[ca.SX, ca.SX]:

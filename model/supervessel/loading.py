@@ -109,7 +109,7 @@ def _range_problems(scene: Scene) -> list[str]:
 
 
 def _composite_problems(scene: Scene) -> list[str]:
-    """Returns why the whole cannot turn: no mass, or a tensor that Euler's equations cannot be solved with."""
+    """Returns why the whole cannot turn: no mass, or a tensor that the law cannot be solved with."""
     total = sum(vessel.mass for vessel in scene.vessels.values())
     if not 0.0 < total < float("inf"):
         return [f"vessels: total mass = {total} kg: must be a finite number > 0"]

@@ -117,14 +117,17 @@ def _docks(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[s
         elif vessels[0] == vessels[1]:
             yield f"{place}: both ports belong to {vessels[0]}; a dock joins two vessels"
         elif component[vessels[0]] == component[vessels[1]]:
-            yield f"{place}: {names[0]} - {names[1]} closes a loop; {' and '.join(vessels)} are joined already"
+            joined = " and ".join(vessels)
+            yield f"{place}: {names[0]} - {names[1]} closes a loop; {joined} are joined already"
         else:
-            joined = component[vessels[1]]
-            component |= {v: component[vessels[0]] for v, c in component.items() if c == joined}
+            absorbed = component[vessels[1]]
+            component |= {v: component[vessels[0]] for v, c in component.items() if c == absorbed}
     yield from _root(raw, component if complete else {}, ports)
 
 
-def _root(raw: Mapping[str, Any], component: Mapping[str, str], ports: Mapping[str, list[str]]) -> Iterator[str]:
+def _root(
+    raw: Mapping[str, Any], component: Mapping[str, str], ports: Mapping[str, list[str]]
+) -> Iterator[str]:
     root = raw.get("root")
     if not isinstance(root, str):
         return

@@ -13,7 +13,8 @@ def rk4_step(ode: Callable[[ca.SX], ca.SX], state: ca.SX, step: ca.SX) -> ca.SX:
 
     ode   : state -> its rate
     step  : [s]
-    Source: [HNW] section II.1, table 1.2: the classical method of order 4, here for attitude and rate jointly.
+    Source: [HNW] section II.1, table 1.2: the classical method of order 4, for attitude and
+    rate jointly.
     """
     half = 0.5 * step
     k1 = ode(state)

@@ -68,20 +68,21 @@ def _tensor(value: object) -> Matrix:
         isinstance(value, list | tuple)
         and len(value) == 3
         and all(
-            isinstance(row, list | tuple) and len(row) == 3 and all(_is_number(x) for x in row) for row in value
+            isinstance(row, list | tuple) and len(row) == 3 and all(_is_number(x) for x in row)
+            for row in value
         )
     ):
         raise ValueError(where + "must be three rows of three finite numbers")
     tensor = np.array(value, dtype=float)
     for i, j in ((0, 1), (0, 2), (1, 2)):
         if tensor[i, j] != tensor[j, i]:
-            raise ValueError(
-                f"{where}must be symmetric, but [{i + 1},{j + 1}] = {tensor[i, j]} and [{j + 1},{i + 1}] = {tensor[j, i]}"
-            )
+            here, there = f"[{i + 1},{j + 1}] = {tensor[i, j]}", f"[{j + 1},{i + 1}] = {tensor[j, i]}"
+            raise ValueError(f"{where}must be symmetric, but {here} and {there}")
     problem = tensor_problem(tensor)
     if problem:
         raise ValueError(where + problem)
-    return tuple(tuple(row) for row in tensor.tolist())
+    xx, xy, xz, _, yy, yz, _, _, zz = tensor.ravel().tolist()
+    return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
 
 def triangle_problem(moments: Vector) -> str:
@@ -93,7 +94,9 @@ def triangle_problem(moments: Vector) -> str:
     excess = large - (small + middle)
     if excess <= TRIANGLE_SLACK * large:
         return ""
-    return f"{large:.17g} exceeds {small:.17g} + {middle:.17g} by {excess:.6g}; no rigid body has these moments"
+    return (
+        f"{large:.17g} exceeds {small:.17g} + {middle:.17g} by {excess:.6g}; no rigid body has these moments"
+    )
 
 
 def tensor_problem(tensor: NDArray[np.float64]) -> str:
@@ -106,8 +109,8 @@ def tensor_problem(tensor: NDArray[np.float64]) -> str:
     excess = moments[2] - (moments[0] + moments[1])
     if excess > slack:
         return (
-            f"its principal moments are {three} kg m2: {moments[2]:.10g} exceeds {moments[0]:.10g} + {moments[1]:.10g} "
-            f"by {excess:.6g}; no rigid body has these moments"
+            f"its principal moments are {three} kg m2: {moments[2]:.10g} exceeds {moments[0]:.10g} + "
+            f"{moments[1]:.10g} by {excess:.6g}; no rigid body has these moments"
         )
     return ""
 
@@ -140,7 +143,8 @@ def _pmi(value: Any) -> Vector:
     problem = triangle_problem(value)
     if problem:
         raise ValueError(f" = {quantity(value, 'm2')}: {problem}")
-    return tuple(value)  # type: ignore[return-value]
+    k1, k2, k3 = value
+    return k1, k2, k3
 
 
 Mass = Annotated[float, number("kg", "a finite number >= 0", 0.0)]
@@ -163,7 +167,8 @@ def _attitude(value: Any) -> tuple[float, float, float, float]:
         raise ValueError(f" = {quantity(value)}: must have a length greater than 0")
     scaled = [component / scale for component in value]
     norm = math.sqrt(math.fsum(component * component for component in scaled))
-    return tuple(component / norm for component in scaled)  # type: ignore[return-value]
+    w, x, y, z = (component / norm for component in scaled)
+    return w, x, y, z
 
 
 Attitude = Annotated[

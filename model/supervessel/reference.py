@@ -130,7 +130,8 @@ def rotation_matrix(attitude: ArrayLike) -> Array:
     """Returns R_inertial_body, (3, 3), of the unit quaternion `attitude`, (4,), scalar first."""
     w, x, y, z = np.asarray(attitude, dtype=float)
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
+    rotation: Array = np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
+    return rotation
 
 
 def attitude_dot(attitude: ArrayLike, angular_velocity: ArrayLike) -> Array:
@@ -143,7 +144,9 @@ def attitude_dot(attitude: ArrayLike, angular_velocity: ArrayLike) -> Array:
     return 0.5 * np.concatenate([[-q[1:] @ omega], q[0] * omega + np.cross(q[1:], omega)])
 
 
-def angular_acceleration(law: str, inertia: ArrayLike, angular_velocity: ArrayLike, torque: ArrayLike) -> Array:
+def angular_acceleration(
+    law: str, inertia: ArrayLike, angular_velocity: ArrayLike, torque: ArrayLike
+) -> Array:
     """Returns the angular acceleration, (3,) [rad/s2], body axes, under a rotation law.
 
     law              : "none", "decoupled", "principal" or "tensor"
@@ -163,11 +166,15 @@ def angular_acceleration(law: str, inertia: ArrayLike, angular_velocity: ArrayLi
         J = np.diag(np.diag(J))
     elif law != "tensor":
         raise ValueError(f'law = "{law}": must be one of none, decoupled, principal, tensor')
-    return np.linalg.solve(J, torque - np.cross(omega, J @ omega))
+    acceleration: Array = np.linalg.solve(J, torque - np.cross(omega, J @ omega))
+    return acceleration
 
 
 def ode(
-    scene: Scene, state: ArrayLike, torque: ArrayLike = (0.0, 0.0, 0.0), values: Mapping[str, float] | None = None
+    scene: Scene,
+    state: ArrayLike,
+    torque: ArrayLike = (0.0, 0.0, 0.0),
+    values: Mapping[str, float] | None = None,
 ) -> Array:
     """Returns the rate of the state (attitude, angular velocity), (7,), of a scene under its own law."""
     state = np.asarray(state, dtype=float)

@@ -109,12 +109,16 @@ class Port(Table):
         ]
         _refuse(problems)
         sine, cosine = _sine_cosine(self.direction, self.alignment)
-        where = f" = {quantity(self.alignment)}: must be perpendicular to direction = {quantity(self.direction)}"
+        where = (
+            f" = {quantity(self.alignment)}: must be perpendicular to direction = {quantity(self.direction)}"
+        )
         if sine < PARALLEL_LIMIT:
             _refuse([("alignment", f"{where}, but is parallel to it within {PARALLEL_LIMIT:g} rad")])
         if abs(math.atan2(cosine, sine)) > PERPENDICULAR_LIMIT:
             off = abs(math.atan2(cosine, sine))
-            _refuse([("alignment", f"{where}, but is {off:.6g} rad off; at most {PERPENDICULAR_LIMIT:g} rad")])
+            _refuse(
+                [("alignment", f"{where}, but is {off:.6g} rad off; at most {PERPENDICULAR_LIMIT:g} rad")]
+            )
         return self
 
 
@@ -247,7 +251,7 @@ def known_keys(place: tuple[Any, ...]) -> list[str]:
 def input_groups(
     mass: Iterable[str], pmi: Iterable[str], pose: Iterable[str], torque: bool
 ) -> dict[str, int]:
-    """Returns the inputs that the lists of `[inputs]` ask for: name without index -> elements, 0 for a scalar.
+    """Returns the inputs that the lists of `[inputs]` ask for: name without index -> elements (scalar: 0).
 
     The order is that of the FMU's model description; the twin's p is all but the torque.
     """

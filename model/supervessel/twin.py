@@ -1,15 +1,31 @@
 """The twin: the FMU's own equations as CasADi functions, for control design and estimation."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from supervessel.equations import composite_slices, equations
+from supervessel.equations import UPPER_TRIANGLE, Equations, composite_slices, equations
 from supervessel.inertia import symmetric
 from supervessel.scene import Scene
 from supervessel.variables import input_variables
+
+
+@contextmanager
+def _as_written() -> Iterator[None]:
+    """Composes expressions without rewriting them.
+
+    CasADi turns x * (1/y) into x/y when the two meet in one graph. The FMU computes 1/y once for each
+    change of inertia, so the twin must multiply by it as well to give the same last bit.
+    """
+    ca.GlobalOptions.setSimplificationOnTheFly(False)
+    try:
+        yield
+    finally:
+        ca.GlobalOptions.setSimplificationOnTheFly(True)
 
 
 class Twin:
@@ -19,6 +35,9 @@ class Twin:
     u = the torque inputs [N m], (3,) or (0,)
     p = the FMU's other inputs, (n,), in the order of its model description
     h = step [s]
+
+    Each function's numbers are the FMU's to the last bit: both evaluate the same operations in the same
+    order, and only + - * / and the square root occur, which IEEE 754 rounds correctly everywhere.
 
     composite    : p -> mass [kg], barycentre (3,) [m], inertia (3, 3) [kg m2], pmi (3,) [m2]
     ode          : x, u, p -> x_dot
@@ -43,28 +62,28 @@ class Twin:
         self.u = ca.SX.sym("u", len(self.u_names))
         self.x = ca.SX.sym("x", len(self.x_names))
         self.h = ca.SX.sym("h")
+        with _as_written():
+            self._compose(model)
+
+    def _compose(self, model: Equations) -> None:
+        """Makes functions of p out of those of c."""
         c = model.composite(self.p)
-        args, names = [self.x, self.u, self.p], ["x", "u", "p"]
         where = composite_slices()
-        elements = ca.vertsplit(c[where["inertia"]])
-        order = {(0, 0): 0, (1, 1): 1, (2, 2): 2, (0, 1): 3, (0, 2): 4, (1, 2): 5}
-        inertia = symmetric(lambda i, j: elements[order[i, j]])
-        parts = [c[where["mass"]], c[where["barycentre"]], inertia, c[where["pmi"]]]
+        elements = dict(zip(UPPER_TRIANGLE, ca.vertsplit(c[where["inertia"]]), strict=True))
+        inertia = symmetric(lambda i, j: elements[i, j])
+        args, names = [self.x, self.u, self.p], ["x", "u", "p"]
         self.composite = ca.Function(
-            "composite", [self.p], parts, ["p"], ["mass", "barycentre", "inertia", "pmi"]
+            "composite",
+            [self.p],
+            [c[where["mass"]], c[where["barycentre"]], inertia, c[where["pmi"]]],
+            ["p"],
+            ["mass", "barycentre", "inertia", "pmi"],
         )
-        self.ode = ca.Function("ode", args, [model.ode(self.x, self.u, c)], names, ["x_dot"])
-        self.longest_step = ca.Function(
-            "longest_step", args, [model.longest_step(self.x, self.u, c)], names, ["h_max"]
-        )
-        self.step = ca.Function(
-            "step",
-            [*args, self.h],
-            [model.step(self.x, self.u, c, self.h)],
-            [*names, "h"],
-            ["x_next"],
-        )
-        self.outputs = ca.Function("outputs", args, [model.outputs(self.x, self.u, c)], names, ["y"])
+        at = (self.x, self.u, c)
+        self.ode = ca.Function("ode", args, [model.ode(*at)], names, ["x_dot"])
+        self.longest_step = ca.Function("longest_step", args, [model.longest_step(*at)], names, ["h_max"])
+        self.step = ca.Function("step", [*args, self.h], [model.step(*at, self.h)], [*names, "h"], ["x_next"])
+        self.outputs = ca.Function("outputs", args, [model.outputs(*at)], names, ["y"])
 
     @cached_property
     def x_start(self) -> NDArray[np.float64]:
