@@ -160,8 +160,8 @@ def main() -> None:
     (BUILD / "iss_dg.md").write_text(
         "# ISS with a DeltaGlider, ten minutes\n\n"
         "Fuel burns from 60 to 360 s, the docking port of the ship is moved from 400 to 460 s, torque\n"
-        "pulses act about x (30-50, 200-220 s) and z (100-120, 500-520 s). Law `tensor`; the last column is how\n"
-        "far the law `principal`, which leaves the products of inertia out, has turned away from it.\n\n"
+        "pulses act about x (30-50, 200-220 s) and z (100-120, 500-520 s). Law `tensor`; the last column is\n"
+        "how far the law `principal`, which leaves the products of inertia out, has turned away from it.\n\n"
         f"{results}\n\n"
         "![PMI, barycentre, mass](iss_dg_inertia.png)\n\n![rates, attitude, drift](iss_dg_rotation.png)\n\n"
         "Every output at every step: `iss_dg.csv`.\n"

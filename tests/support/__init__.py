@@ -1,0 +1,270 @@
+"""Shared by the tests: small scenes as dictionaries, FMUs built from them, instances driven through FMPy."""
+
+import copy
+import json
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fmpy import extract, read_model_description
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.fmi3 import FMU3Slave
+
+from fmu_build import build_fmu
+from supervessel import Scene, parse_scene
+
+EPS = 2.0**-52
+OK, WARNING, DISCARD, ERROR = range(4)
+
+ISS_DG: dict[str, Any] = {
+    "name": "iss_dg",
+    "root": "ISS",
+    "vessels": {
+        "ISS": {
+            "mass": 455000.0,
+            "pmi": [385.0, 719.0, 508.0],
+            "ports": {
+                "P2": {
+                    "position": [0.09, -17.9, 3.8],
+                    "direction": [0.0, -1.0, 0.0],
+                    "alignment": [0.0, 0.0, -1.0],
+                }
+            },
+        },
+        "DG": {
+            "mass": 24500.0,
+            "pmi": [15.5, 22.1, 7.7],
+            "ports": {
+                "nose": {
+                    "position": [0.0, -0.49, -10.076],
+                    "direction": [0.0, 0.0, -1.0],
+                    "alignment": [0.0, 1.0, 0.0],
+                }
+            },
+        },
+    },
+    "docks": [{"ports": ["ISS.P2", "DG.nose"]}],
+    "inputs": {"mass": ["DG"], "pmi": ["DG"], "pose": ["DG.nose"], "torque": True},
+    "outputs": {
+        "names": [
+            "mass",
+            "barycentre",
+            "pmi",
+            "inertia",
+            "angular_velocity",
+            "attitude",
+            "kinetic_energy",
+            "angular_momentum",
+        ]
+    },
+}
+"""The ISS with a DeltaGlider, everything of the ship an input, every output."""
+
+
+def variant(raw: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns a deep copy of a raw scene with values put at dotted paths; a value of None removes the key."""
+    new: dict[str, Any] = copy.deepcopy(dict(raw))
+    for path, value in changes.items():
+        table = new
+        *tables, key = path.split(".")
+        for name in tables:
+            table = table.setdefault(name, {})
+        if value is None:
+            del table[key]
+        else:
+            table[key] = value
+    return new
+
+
+def body(mass: float = 1000.0, pmi: Sequence[float] = (1.0, 2.0, 2.5), **rotation: Any) -> dict[str, Any]:
+    """Returns the raw scene of a single body with torque inputs and every output."""
+    return {
+        "name": "body",
+        "root": "B",
+        "vessels": {"B": {"mass": mass, "pmi": list(pmi)}},
+        "inputs": {"torque": True},
+        "rotation": rotation,
+        "outputs": copy.deepcopy(ISS_DG["outputs"]),
+    }
+
+
+@cache
+def _built(text: str, fmi: int) -> Path:
+    folder = Path(tempfile.mkdtemp(prefix="supervessel-test-"))
+    return build_fmu(parse_scene(json.loads(text)), folder / "scene.fmu", fmi)
+
+
+def built(raw: Mapping[str, Any], fmi: int = 3) -> Path:
+    """Returns the path of the FMU of a raw scene, built once for each test process."""
+    return _built(json.dumps(raw, sort_keys=True), fmi)
+
+
+@cache
+def _unpacked(path: Path) -> tuple[str, Any]:
+    return extract(str(path)), read_model_description(str(path))
+
+
+class Instance:
+    """An instance of a built FMU, of either version, addressed by variable names.
+
+    Each call returns the FMI status; `log` holds (status, category, message) of each line logged.
+    """
+
+    def __init__(self, raw: Mapping[str, Any], fmi: int = 3, logging: bool = True, name: str = "it") -> None:
+        folder, description = _unpacked(built(raw, fmi))
+        self.fmi, self.description = fmi, description
+        self.references = {v.name: v.valueReference for v in description.modelVariables}
+        self.log: list[tuple[int, str, str]] = []
+        arguments = {
+            "guid": description.guid,
+            "unzipDirectory": folder,
+            "modelIdentifier": description.coSimulation.modelIdentifier,
+            "instanceName": name,
+        }
+        if fmi == 3:
+            self.fmu = FMU3Slave(**arguments)
+            self.fmu.instantiate(loggingOn=logging, logMessage=self._log3)
+        else:
+            self.fmu = FMU2Slave(**arguments)
+            callbacks = fmi2CallbackFunctions()
+            callbacks.logger = fmi2CallbackLoggerTYPE(self._log2)
+            self.fmu.instantiate(loggingOn=logging, callbacks=callbacks)
+        self.time = 0.0
+
+    def _log3(self, environment: Any, status: int, category: bytes, message: bytes) -> None:
+        self.log.append((status, category.decode(), message.decode()))
+
+    def _log2(self, environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
+        self.log.append((status, category.decode(), message.decode()))
+
+    def _status(self, function: Any, *arguments: Any, **named: Any) -> int:
+        try:
+            function(*arguments, **named)
+        except FMICallException as exception:
+            return int(exception.status)
+        return OK
+
+    def initialise(self, start: float = 0.0, stop: float | None = None, **values: Any) -> int:
+        """Enters initialisation, sets values by group or name, exits; returns the last status."""
+        self.enter(start, stop)
+        for name, value in values.items():
+            self.set({name: value})
+        return self.exit()
+
+    def enter(self, start: float = 0.0, stop: float | None = None) -> int:
+        self.time = start
+        if self.fmi == 3:
+            return self._status(self.fmu.enterInitializationMode, startTime=start, stopTime=stop)
+        status = self._status(self.fmu.setupExperiment, startTime=start, stopTime=stop)
+        return status or self._status(self.fmu.enterInitializationMode)
+
+    def exit(self) -> int:
+        return self._status(self.fmu.exitInitializationMode)
+
+    def step(self, h: float) -> int:
+        """Steps by h from the instance's time, which advances if the step succeeds."""
+        status = self._status(self.fmu.doStep, currentCommunicationPoint=self.time, communicationStepSize=h)
+        if status == OK:
+            self.time += h
+        return status
+
+    def set(self, values: Mapping[str, Any]) -> int:
+        """Sets scalars by name, or whole vectors by the name without index, in one call."""
+        names, numbers = [], []
+        for name, value in values.items():
+            group = self.names(name)
+            names += group
+            numbers += [float(x) for x in np.ravel(value)]
+            assert len(names) == len(numbers), name
+        setter = self.fmu.setFloat64 if self.fmi == 3 else self.fmu.setReal
+        return self._status(setter, [self.references[name] for name in names], numbers)
+
+    def get(self, name: str) -> Any:
+        """Returns a scalar, or a vector or tensor (flat, as a numpy array) by the name without index.
+
+        Raises FMICallException where the FMU does not answer.
+        """
+        getter = self.fmu.getFloat64 if self.fmi == 3 else self.fmu.getReal
+        numbers = np.array(getter([self.references[element] for element in self.names(name)]))
+        return float(numbers[0]) if name in self.references else numbers
+
+    def get_status(self, name: str) -> int:
+        return self._status(self.get, name)
+
+    def names(self, name: str) -> list[str]:
+        """Returns the scalars that a name stands for, in order."""
+        if name in self.references:
+            return [name]
+        elements = [full for full in self.references if full.startswith(f"{name}[")]
+        if not elements:
+            raise KeyError(name)
+        return elements
+
+    def messages(self) -> list[str]:
+        """Returns the messages logged so far that are no information."""
+        return [message for status, _, message in self.log if status != OK]
+
+    def reset(self) -> int:
+        self.time = 0.0
+        return self._status(self.fmu.reset)
+
+    def free(self) -> None:
+        self.fmu.freeInstance()
+
+
+@contextmanager
+def flying(raw: Mapping[str, Any], fmi: int = 3, **values: Any) -> Iterator[Instance]:
+    """Yields an initialised instance of a raw scene; frees it."""
+    instance = Instance(raw, fmi)
+    try:
+        assert instance.initialise(**values) == OK, instance.log
+        yield instance
+    finally:
+        instance.free()
+
+
+def scene(raw: Mapping[str, Any]) -> Scene:
+    """Returns the scene of a raw one."""
+    return parse_scene(raw)
+
+
+def relative_error(value: Any, truth: Any) -> float:
+    """Returns the largest difference over the largest magnitude of the truth."""
+    value, truth = np.asarray(value, dtype=float), np.asarray(truth, dtype=float)
+    return float(np.abs(value - truth).max() / np.abs(truth).max())
+
+
+def random_rotation(seed: int) -> np.ndarray:
+    """Returns a rotation matrix, (3, 3), drawn with a seed."""
+    q = np.random.default_rng(seed).normal(size=4)
+    w, x, y, z = q / np.linalg.norm(q)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+__all__ = [
+    "DISCARD",
+    "EPS",
+    "ERROR",
+    "ISS_DG",
+    "OK",
+    "WARNING",
+    "Instance",
+    "body",
+    "built",
+    "flying",
+    "random_rotation",
+    "relative_error",
+    "scene",
+    "variant",
+]
