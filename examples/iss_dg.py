@@ -112,7 +112,7 @@ def plot(panels: list[tuple[str, np.ndarray, list[str]]], t: np.ndarray, file: P
         ax.plot(t, curves, label=names)
         ax.set_ylabel(label)
         ax.grid(alpha=0.3)
-        ax.legend(loc="upper right", fontsize="small", ncols=len(names))
+        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize="small")
     axes[-1].set_xlabel("time [s]")
     figure.tight_layout()
     figure.savefig(file, dpi=120)
