@@ -2,13 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import frexp, ldexp
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
 from supervessel.assembly import Joint, joints
-from supervessel.inertia import Body, congruence, join
+from supervessel.inertia import Body, combine, congruence
+from supervessel.quantities import Vector
 from supervessel.scene import Scene
 
 Lookup = Callable[[str, ArrayLike], ca.SX]
@@ -56,9 +58,9 @@ def mated_pose(parent: tuple[ca.SX, ca.SX], child: tuple[ca.SX, ca.SX]) -> Pose:
 def composite_body(scene: Scene, lookup: Lookup) -> Body:
     """Returns the whole assembly as one body in the root vessel's axes.
 
-    Vessels that no pose input separates form a rigid group: they are joined in the axes of the group's
-    first vessel, those of constant mass first, so that all that is constant has become numbers before
-    the group is placed by the pose that moves it.
+    Vessels that no pose input separates form a rigid group. Those of constant mass are combined in the axes
+    of the group's first vessel, so that they have become numbers before the group is placed by the pose that
+    moves it; the others are placed one by one.
     """
     groups = {scene.root: scene.root}
     inside = {scene.root: Pose(constant(np.eye(3)), constant(np.zeros(3)))}
@@ -73,12 +75,25 @@ def composite_body(scene: Scene, lookup: Lookup) -> Body:
         else:
             groups[joint.child] = groups[joint.parent]
             inside[joint.child] = pose
+    members: dict[str, list[Body]] = {group: [] for group in placed}
+    for vessel, pose in inside.items():
+        members[groups[vessel]].append(_vessel_body(scene, vessel, lookup, pose))
     bodies = []
     for group, pose in placed.items():
-        members = [vessel for vessel in inside if groups[vessel] == group]
-        body = _joined([_vessel_body(scene, vessel, lookup, inside[vessel]) for vessel in members])
-        bodies.append(body if group == scene.root else body.seen_from(pose.rotation, pose.origin))
-    return _joined(bodies)
+        lumped = _lump(members[group])
+        bodies += lumped if group == scene.root else [b.seen_from(pose.rotation, pose.origin) for b in lumped]
+    return combine(bodies)
+
+
+def _lump(bodies: list[Body]) -> list[Body]:
+    """Returns bodies with those of constant mass combined, first of all; those without mass are left out."""
+    constants = [body for body in bodies if body.mass.is_constant() and not body.mass.is_zero()]
+    constants.sort(key=lambda body: -float(body.mass))
+    fixed = [body for body in constants if body.inertia.is_constant()]
+    others = [body for body in bodies if not body.mass.is_constant()]
+    return (
+        ([combine(fixed)] if fixed else []) + [b for b in constants if not b.inertia.is_constant()] + others
+    )
 
 
 def constant(value: ArrayLike) -> ca.SX:
@@ -94,10 +109,17 @@ def _joint_pose(scene: Scene, joint: Joint, lookup: Lookup) -> Pose:
 def _port(scene: Scene, name: str, lookup: Lookup) -> tuple[ca.SX, ca.SX]:
     """Returns position and axes of a port in its vessel's axes."""
     port = scene.port(name)
-    position, direction, alignment = (
-        lookup(f"{name}.{key}", getattr(port, key)) for key in ("position", "direction", "alignment")
+    position = lookup(f"{name}.position", port.position)
+    direction, alignment = (
+        lookup(f"{name}.{key}", _scaled(getattr(port, key))) for key in ("direction", "alignment")
     )
     return position, port_axes(direction, alignment)
+
+
+def _scaled(vector: Vector) -> ArrayLike:
+    """Returns a vector scaled by a power of two, exactly, to a length between 1/2 and 2."""
+    _, exponent = frexp(max(map(abs, vector)))
+    return [ldexp(component, -exponent) for component in vector]
 
 
 def _vessel_body(scene: Scene, name: str, lookup: Lookup, pose: Pose) -> Body:
@@ -111,13 +133,3 @@ def _vessel_body(scene: Scene, name: str, lookup: Lookup, pose: Pose) -> Body:
     centre = constant(vessel.centre_of_mass)
     specific = congruence(pose.rotation, specific_inertia)
     return Body(mass, pose.origin + pose.rotation @ centre, mass * specific)
-
-
-def _joined(bodies: list[Body]) -> Body:
-    """Returns bodies seen from the same axes as one, constants before what may change, heaviest first."""
-    constants = [body for body in bodies if body.mass.is_constant()]
-    constants.sort(key=lambda body: -float(body.mass))
-    whole, *others = constants + [body for body in bodies if not body.mass.is_constant()]
-    for body in others:
-        whole = join(whole, body)
-    return whole

@@ -5,28 +5,41 @@ what follows from p alone. c is computed when p changes, everything else uses c.
 constant in this scene is a number in those functions, not an argument that is read.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from itertools import pairwise
+from math import frexp, ldexp
 
 import casadi as ca
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from supervessel.attitude import attitude_dot, to_inertial
+from supervessel.attitude import attitude_dot, to_inertial, unit
 from supervessel.docking import composite_body, constant
-from supervessel.inertia import ldl, symmetric
-from supervessel.propagators import longest_step, rk4_step
-from supervessel.quantities import PIVOT_SLACK
+from supervessel.inertia import from_upper_triangle, ldl, upper_triangle
+from supervessel.propagators import fastest_square, rk4_step
+from supervessel.quantities import EPSILON
 from supervessel.rotation import LAWS
 from supervessel.scene import Scene
-from supervessel.variables import input_variables, output_variables, state_names
-
-UPPER_TRIANGLE = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+from supervessel.variables import input_variables, output_variables, state_variables
 
 COMPOSITE_SIZES = {"mass": 1, "barycentre": 3, "inertia": 6, "pmi": 3, "margins": 3}
 """Layout of c; the law's own numbers follow. inertia is the upper triangle xx, yy, zz, xy, xz, yz.
 
-margins are the pivots of J = L D L^T less what rounding may leave of a zero: positive where the
-tensor is positive definite as far as doubles can tell.
+margins are the pivots of J = L D L^T less what rounding may leave of a zero: positive where the tensor is
+positive definite as far as doubles can tell.
+"""
+
+LONGEST_EXPONENT = 200
+"""Binary exponent of a length beyond which p_start scales a direction: its fourth power is no double."""
+
+PIVOT_SLACK = 16.0 * EPSILON
+"""What rounding may leave of a pivot that is zero, over the element J_kk that it was taken from.
+
+The elements of a composite tensor are each off by a few u of sqrt(J_ii J_jj), which bounds |J_ij|. So the
+second pivot of L D L^T is off by a few u of J_22, the third by a few u of J_33 J_22/d_2: what the second row
+takes from it is divided by that row's own pivot d_2.
 """
 
 
@@ -36,16 +49,24 @@ class Equations:
 
     composite    : p -> c
     ode          : x, u, c -> rate of x
-    longest_step : x, u, c -> longest sub-step [s] within the scene's angle
+    fastest_square : x, u, c -> square [rad2/s2] of the fastest rate while turning by the scene's angle
     step         : x, u, c, h -> x after one sub-step of h [s]
-    outputs      : x, u, c -> the outputs, in the scene's order
+    outputs      : x, u, c -> the outputs y, in the scene's order
+
+    Derivatives: a name ending in _forward takes small changes of the arguments, each after the arguments
+    themselves, to those of the results; _reverse takes weights of the results to those of the arguments.
+    response is (ode, outputs).
     """
 
     composite: ca.Function
     ode: ca.Function
-    longest_step: ca.Function
+    fastest_square: ca.Function
     step: ca.Function
     outputs: ca.Function
+    composite_forward: ca.Function
+    composite_reverse: ca.Function
+    response_forward: ca.Function
+    response_reverse: ca.Function
     p_names: tuple[str, ...]
     u_names: tuple[str, ...]
     x_names: tuple[str, ...]
@@ -54,7 +75,7 @@ class Equations:
     @property
     def functions(self) -> tuple[ca.Function, ...]:
         """All functions."""
-        return self.composite, self.ode, self.longest_step, self.step, self.outputs
+        return tuple(getattr(self, f.name) for f in fields(self) if not f.name.endswith("_names"))
 
 
 def composite_slices() -> dict[str, slice]:
@@ -66,6 +87,18 @@ def composite_slices() -> dict[str, slice]:
     return slices | {"law": slice(start, None)}
 
 
+@contextmanager
+def simplification(on: bool) -> Iterator[None]:
+    """Has CasADi simplify expressions as they are built, or not, whatever the caller has set for his own."""
+    before = ca.GlobalOptions.getSimplificationOnTheFly()
+    ca.GlobalOptions.setSimplificationOnTheFly(on)
+    try:
+        yield
+    finally:
+        ca.GlobalOptions.setSimplificationOnTheFly(before)
+
+
+@simplification(True)
 def equations(scene: Scene) -> Equations:
     """Returns the equations of a scene, folded for what it holds constant."""
     inputs = [variable.name for variable in input_variables(scene)]
@@ -85,20 +118,52 @@ def equations(scene: Scene) -> Equations:
         return ca.vertcat(attitude_dot(state[:4], state[4:]), acceleration)
 
     by_torque = law.acceleration(parts["law"], ca.SX.zeros(3), torque)
-    longest = longest_step(x[4:], by_torque, law.growth, scene.rotation.max_angle_step)
+    fastest = fastest_square(x[4:], by_torque, law.growth, scene.rotation.max_angle_step)
     y = _outputs(scene, x, parts)
     args, names = [x, u, c], ["x", "u", "c"]
     return Equations(
         composite=ca.Function("composite", [p], [c_of_p], ["p"], ["c"]),
         ode=ca.Function("ode", args, [rate(x)], names, ["x_dot"]),
-        longest_step=ca.Function("longest_step", args, [longest], names, ["h_max"]),
+        fastest_square=ca.Function("fastest_square", args, [fastest], names, ["rate_square"]),
         step=ca.Function("step", [*args, h], [rk4_step(rate, x, h)], [*names, "h"], ["x_next"]),
         outputs=ca.Function("outputs", args, [y], names, ["y"]),
+        **_derivatives("composite", [p], [c_of_p]),
+        **_derivatives("response", args, [rate(x), y]),
         p_names=p_names,
         u_names=u_names,
-        x_names=state_names(),
+        x_names=tuple(variable.name for variable in state_variables(scene)),
         y_names=tuple(variable.name for variable in output_variables(scene)),
     )
+
+
+def p_start(scene: Scene) -> NDArray[np.float64]:
+    """Returns the scene's values of p, (n,).
+
+    A direction whose square would under- or overflow is scaled by a power of two, as the FMU does: only
+    where it points matters.
+    """
+    values = []
+    for variable in input_variables(scene):
+        if variable.group == "torque":
+            continue
+        owner, _, kind = variable.group.rpartition(".")
+        start = variable.start
+        if kind in ("direction", "alignment"):
+            _, exponent = frexp(max(map(abs, getattr(scene.port(owner), kind))))
+            start = ldexp(start, -exponent) if abs(exponent) > LONGEST_EXPONENT else start
+        values.append(start)
+    return np.array(values)
+
+
+@simplification(True)
+def composite_at_start(scene: Scene) -> dict[str, NDArray[np.float64]]:
+    """Returns the parts of c by name, (n,) each, for the scene's own values of the inputs."""
+    inputs = [v for v in input_variables(scene) if v.group != "torque"]
+    p = ca.SX.sym("p", len(inputs))
+    names = tuple(v.name for v in inputs)
+    c = ca.Function("composite", [p], [_composite(scene, names, p, LAWS[scene.rotation.law].prepare)])
+    values = np.array(c(p_start(scene))).ravel()
+    return {name: values[where] for name, where in composite_slices().items()}
 
 
 def _composite(scene: Scene, names: tuple[str, ...], p: ca.SX, prepare: Callable[[ca.SX], ca.SX]) -> ca.SX:
@@ -119,19 +184,43 @@ def _composite(scene: Scene, names: tuple[str, ...], p: ca.SX, prepare: Callable
         ca.vertcat(
             body.mass,
             body.centre,
-            ca.vertcat(*(J[i, j] for i, j in UPPER_TRIANGLE)),
+            upper_triangle(J),
             ca.diag(J) / body.mass,
-            pivots - PIVOT_SLACK * ca.diag(J),
+            pivots[0],
+            pivots[1] - PIVOT_SLACK * J[1, 1],
+            pivots[2] - PIVOT_SLACK * (J[2, 2] * (J[1, 1] / pivots[1])),
             prepare(J),
         )
     )
 
 
+def _derivatives(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> dict[str, ca.Function]:
+    """Returns the functions NAME_forward and NAME_reverse."""
+    together, changed = ca.vertcat(*arguments), ca.vertcat(*results)
+    seeds = [ca.SX.sym(f"d{i}", a.numel()) for i, a in enumerate(arguments)]
+    weights = [ca.SX.sym(f"w{i}", r.numel()) for i, r in enumerate(results)]
+    forward = ca.densify(ca.jtimes(changed, together, ca.vertcat(*seeds)))
+    reverse = ca.densify(ca.jtimes(changed, together, ca.vertcat(*weights), True))
+    return {
+        f"{name}_forward": ca.Function(f"{name}_forward", arguments + seeds, _split(forward, results)),
+        f"{name}_reverse": ca.Function(f"{name}_reverse", arguments + weights, _split(reverse, arguments)),
+    }
+
+
+def _split(vector: ca.SX, like: list[ca.SX]) -> list[ca.SX]:
+    """Returns a vector cut into parts of the sizes of `like`."""
+    ends = np.cumsum([0] + [part.numel() for part in like])
+    return [vector[int(start) : int(end)] for start, end in pairwise(ends)]
+
+
 def _outputs(scene: Scene, x: ca.SX, parts: dict[str, ca.SX]) -> ca.SX:
-    """Returns the scene's outputs, in its order."""
-    attitude, omega = x[:4], x[4:]
-    elements = dict(zip(UPPER_TRIANGLE, ca.vertsplit(parts["inertia"]), strict=True))
-    J = symmetric(lambda i, j: elements[i, j])
+    """Returns the scene's outputs, in its order.
+
+    The attitude is brought to unit length once more: as a state it keeps it only to the accuracy of
+    whoever integrates it.
+    """
+    attitude, omega = unit(x[:4]), x[4:]
+    J = from_upper_triangle(parts["inertia"])
     momentum = J @ omega
     available = {
         "mass": parts["mass"],

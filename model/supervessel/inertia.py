@@ -3,10 +3,13 @@
 What is constant folds to numbers as it is built; a tensor's two triangles share their symbols.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
+
+UPPER_TRIANGLE = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+"""Where xx, yy, zz, xy, xz, yz stand in a tensor."""
 
 
 @dataclass(frozen=True)
@@ -46,37 +49,30 @@ def symmetric(element: Callable[[int, int], ca.SX]) -> ca.SX:
     return ca.densify(matrix)
 
 
-def join(one: Body, other: Body) -> Body:
-    """Returns two bodies, seen from the same axes, as one.
+def combine(bodies: Sequence[Body]) -> Body:
+    """Returns bodies, seen from the same axes, as one; at least one of them must have mass.
 
-    J = J_1 + J_2 + m_1 m_2 / (m_1 + m_2) (|d|^2 E - d d^T), d from one centre to the other: every term
-    is positive or a difference of centres, so nothing cancels at any ratio of masses, wherever the
-    origin is. Two massless bodies together have the first one's centre.
-    Source: [CV] eqs. (10), (11); Huygens-Steiner theorem for both parts about the common centre.
+    J = sum J_j + m_j (|rho_j|^2 E - rho_j rho_j^T), rho_j from the common centre to body j's. Centres are
+    taken from that of the first body before anything is multiplied, so that a far origin costs no digits
+    beyond those of the centres' differences; an error of the common centre enters J squared only.
+    Source: [CV] eqs. (10), (11); Huygens-Steiner theorem.
     """
-    if one.mass.is_zero():
-        return other
-    if other.mass.is_zero():
-        return one
-    mass = one.mass + other.mass
-    share = other.mass / (mass if _is_positive(one.mass) or _is_positive(other.mass) else _nonzero(mass))
-    reduced = one.mass * share
-    d = other.centre - one.centre
-    return Body(
-        mass,
-        one.centre + share * d,
-        one.inertia + other.inertia + reduced * symmetric(lambda i, j: _offset_square(d, i, j)),
-    )
+    first, *others = bodies
+    if not others:
+        return first
+    offsets = [body.centre - first.centre for body in bodies]
+    mass = sum((body.mass for body in others), first.mass)
+    centre = sum((b.mass * d for b, d in zip(others, offsets[1:], strict=True)), ca.SX.zeros(3)) / mass
+    inertia = ca.SX.zeros(3, 3)
+    for body, offset in zip(bodies, offsets, strict=True):
+        rho = offset - centre
+        inertia = inertia + body.inertia + body.mass * _offset_tensor(rho)
+    return Body(mass, first.centre + centre, inertia)
 
 
-def _is_positive(mass: ca.SX) -> bool:
-    """Whether a mass is a number above zero; a symbol may become zero."""
-    return bool(mass.is_constant()) and float(mass) > 0.0
-
-
-def _nonzero(mass: ca.SX) -> ca.SX:
-    """Returns the mass where it is above zero, else 1: the numerator over it is zero then."""
-    return ca.if_else(mass > 0.0, mass, 1.0)
+def _offset_tensor(d: ca.SX) -> ca.SX:
+    """Returns |d|^2 E - d d^T, (3, 3)."""
+    return symmetric(lambda i, j: _offset_square(d, i, j))
 
 
 def _offset_square(d: ca.SX, i: int, j: int) -> ca.SX:
@@ -97,12 +93,27 @@ def ldl(inertia: ca.SX) -> tuple[ca.SX, ca.SX]:
     return ca.vertcat(l21, l31, l32), ca.vertcat(inertia[0, 0], d2, d3)
 
 
-def ldl_solve(lower: ca.SX, inverse_pivots: ca.SX, right: ca.SX) -> ca.SX:
-    """Returns x of L D L^T x = right, (3,), from `ldl` and the reciprocals of its pivots."""
-    y1 = right[0]
-    y2 = right[1] - lower[0] * y1
-    y3 = right[2] - lower[1] * y1 - lower[2] * y2
-    x3 = y3 * inverse_pivots[2]
-    x2 = y2 * inverse_pivots[1] - lower[2] * x3
-    x1 = y1 * inverse_pivots[0] - lower[0] * x2 - lower[1] * x3
-    return ca.vertcat(x1, x2, x3)
+def ldl_inverse(lower: ca.SX, pivots: ca.SX) -> ca.SX:
+    """Returns the inverse of L D L^T, (3, 3), from `ldl`; its diagonal is a sum of positive terms."""
+    m21, m31, m32 = -lower[0], lower[0] * lower[2] - lower[1], -lower[2]
+    i1, i2, i3 = 1.0 / pivots[0], 1.0 / pivots[1], 1.0 / pivots[2]
+    elements = {
+        (0, 0): i1 + (m21 * m21) * i2 + (m31 * m31) * i3,
+        (0, 1): m21 * i2 + m31 * m32 * i3,
+        (0, 2): m31 * i3,
+        (1, 1): i2 + (m32 * m32) * i3,
+        (1, 2): m32 * i3,
+        (2, 2): i3,
+    }
+    return symmetric(lambda i, j: elements[i, j])
+
+
+def upper_triangle(tensor: ca.SX) -> ca.SX:
+    """Returns xx, yy, zz, xy, xz, yz of a symmetric tensor, (6,)."""
+    return ca.vertcat(*(tensor[i, j] for i, j in UPPER_TRIANGLE))
+
+
+def from_upper_triangle(elements: ca.SX) -> ca.SX:
+    """Returns the symmetric tensor, (3, 3), of its xx, yy, zz, xy, xz, yz."""
+    by_place = dict(zip(UPPER_TRIANGLE, ca.vertsplit(elements), strict=True))
+    return symmetric(lambda i, j: by_place[i, j])

@@ -38,7 +38,7 @@ def naming_problems(raw: Mapping[str, Any]) -> list[str]:
     ports = _ports(raw)
     return [
         *_model_name(raw),
-        *_identifiers(ports),
+        *_identifiers(raw, ports),
         *_docks(raw, ports),
         *_inputs(raw, ports),
         *_ranges(raw),
@@ -65,17 +65,18 @@ def _ports(raw: Mapping[str, Any]) -> dict[str, list[str]]:
 def _model_name(raw: Mapping[str, Any]) -> Iterator[str]:
     name = raw.get("name")
     if isinstance(name, str) and not MODEL_NAME.fullmatch(name):
-        yield f'name = "{name}": must be a letter, then letters, digits and single underscores'
+        yield f"name = {quantity(name)}: must be a letter, then letters, digits and single underscores"
 
 
-def _identifiers(ports: Mapping[str, list[str]]) -> Iterator[str]:
-    if not ports:
+def _identifiers(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[str]:
+    if not ports and isinstance(raw.get("vessels"), Mapping):
         yield "vessels: at least one vessel is needed"
     places = [("vessels", vessel) for vessel in ports]
     places += [(f"vessels.{vessel}.ports", port) for vessel, names in ports.items() for port in names]
     for place, name in places:
         if not IDENTIFIER.fullmatch(name):
-            yield f'{place}: name "{name}" must be a letter or underscore, then letters, digits, underscores'
+            rule = "must be a letter or underscore, then letters, digits, underscores"
+            yield f"{place}: name {quantity(name)} {rule}"
         elif name in RESERVED:
             yield f'{place}: name "{name}" is reserved for a variable of the FMU'
 
@@ -100,18 +101,18 @@ def _docks(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[s
     for number, dock in enumerate(_list(raw, "docks"), start=1):
         place = f"docks[{number}].ports"
         names = _list(dock, "ports")
-        if len(names) != 2:
+        if not all(isinstance(name, str) for name in names) or len(names) != 2:
             complete = False
-            if isinstance(dock, Mapping) and "ports" in dock:
+            if names and all(isinstance(name, str) for name in names):
                 yield f'{place} = {quantity(dock["ports"])}: must be two ports, written "vessel.port"'
             continue
         problems = [problem for name in names if (problem := _port_problem(name, ports))]
         yield from (f"{place}: {problem}" for problem in problems)
         yield from (
-            f"{place}: port {name} is docked already, in {taken[name]}" for name in set(names) & set(taken)
+            f"{place}: port {name} is docked already, in {taken[name]}" for name in names if name in taken
         )
-        taken |= {name: f"docks[{number}]" for name in names if isinstance(name, str)}
-        vessels = [str(name).partition(".")[0] for name in names]
+        taken |= dict.fromkeys(names, f"docks[{number}]")
+        vessels = [name.partition(".")[0] for name in names]
         if not all(vessel in ports for vessel in vessels):
             complete = False
         elif vessels[0] == vessels[1]:
@@ -142,6 +143,7 @@ def _root(
 def _inputs(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[str]:
     inputs = _table(raw, "inputs")
     docked = {name for dock in _list(raw, "docks") for name in _list(dock, "ports") if isinstance(name, str)}
+    all_resolved = not any(_port_problem(name, ports) for name in docked)
     for key in ("mass", "pmi", "pose"):
         names = [name for name in _list(inputs, key) if isinstance(name, str)]
         place = f"inputs.{key}"
@@ -152,7 +154,7 @@ def _inputs(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[
                 problem = _port_problem(name, ports)
                 if problem:
                     yield f"{place}: {problem}"
-                elif name not in docked:
+                elif name not in docked and all_resolved:
                     yield f"{place}: {name} is not docked; its pose would change nothing"
             elif name not in ports:
                 yield f"{place}: {unknown('vessel', name, ports)}"
@@ -165,8 +167,11 @@ def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:
     mass, pmi, pose = (_list(inputs, key) for key in ("mass", "pmi", "pose"))
     groups = input_groups(mass, pmi, pose, inputs.get("torque") is True)
     known = list(groups) + [f"{name}[{i}]" for name, size in groups.items() for i in range(1, size + 1)]
-    for name in _table(inputs, "range"):
-        if name not in known:
+    for name, bounds in _table(inputs, "range").items():
+        if isinstance(bounds, Mapping):
+            quoted = ", ".join(f'"{name}.{key}"' for key in bounds)
+            yield f"inputs.range.{name}: the name of an input stands in quotes here: {quoted} = [low, high]"
+        elif name not in known:
             yield f"inputs.range: {unknown('input', name, known)}"
 
 

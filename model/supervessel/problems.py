@@ -1,7 +1,11 @@
 """What is wrong with a scene, in the user's words: every problem at once, each with its place."""
 
+import json
 from collections.abc import Iterable
 from difflib import get_close_matches
+
+LONGEST_INTEGER = 10**400
+"""Integers from here on are described, not printed; no double holds them anyway."""
 
 
 class SceneError(ValueError):
@@ -30,8 +34,12 @@ def quantity(value: object, unit: str = "") -> str:
         text = str(value).lower()
     elif isinstance(value, list | tuple):
         text = "[" + ", ".join(quantity(element) for element in value) + "]"
+    elif isinstance(value, dict):
+        text = "{" + ", ".join(f"{key} = {quantity(element)}" for key, element in value.items()) + "}"
     elif isinstance(value, str):
-        text = f'"{value}"'
+        text = json.dumps(value, ensure_ascii=False)
+    elif isinstance(value, int) and abs(value) >= LONGEST_INTEGER:
+        text = f"an integer of {len(hex(abs(value))) - 2} hexadecimal digits"
     else:
         text = str(value)
     return f"{text} {unit}" if unit else text

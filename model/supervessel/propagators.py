@@ -25,8 +25,8 @@ def rk4_step(ode: Callable[[ca.SX], ca.SX], state: ca.SX, step: ca.SX) -> ca.SX:
     return ca.vertcat(unit(end[:4]), end[4:])
 
 
-def longest_step(angular_velocity: ca.SX, torque_acceleration: ca.SX, growth: float, angle: float) -> ca.SX:
-    """Returns the length of time, [s], in which the body surely turns by no more than `angle`; inf at rest.
+def fastest_square(angular_velocity: ca.SX, torque_acceleration: ca.SX, growth: float, angle: float) -> ca.SX:
+    """Returns the square, [rad2/s2], of a rate that the body does not exceed while it turns by `angle`.
 
     angular_velocity    : (3,) [rad/s], now
     torque_acceleration : (3,) [rad/s2], what the torque alone gives, constant in body axes
@@ -35,9 +35,8 @@ def longest_step(angular_velocity: ca.SX, torque_acceleration: ca.SX, growth: fl
 
     With w = |omega| and a = |torque_acceleration|, dw/dt <= g w^2 + a. Over the angle s turned, ds = w dt,
     this reads d(w^2)/ds <= 2 g w^2 + 2 a, so that w^2 <= w_0^2 e + 2 a f at the end of the angle, with
-    e = exp(2 g s), f = (e - 1)/(2 g), or s where g = 0. The step s/w at that rate cannot turn further.
+    e = exp(2 g s), f = (e - 1)/(2 g), or s where g = 0. A step of angle/w at that rate cannot turn further.
     """
     e = exp(2.0 * growth * angle)
     f = (e - 1.0) / (2.0 * growth) if growth else angle
-    torque_part = 2.0 * f * ca.sqrt(ca.sumsqr(torque_acceleration))
-    return angle / ca.sqrt(e * ca.sumsqr(angular_velocity) + torque_part)
+    return e * ca.sumsqr(angular_velocity) + 2.0 * f * ca.sqrt(ca.sumsqr(torque_acceleration))

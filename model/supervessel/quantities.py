@@ -18,12 +18,9 @@ EPSILON = 2.0**-52
 TRIANGLE_SLACK = 2.0 * EPSILON
 # Eigenvalues of a symmetric 3x3 matrix are computed to a few u of the largest one.
 EIGENVALUE_SLACK = 16.0 * EPSILON
-# A pivot of L D L^T is its diagonal element less what the other rows take; each of the few operations
-# rounds by up to u of that element.
-PIVOT_SLACK = 8.0 * EPSILON
 
 
-def _is_number(value: object) -> bool:
+def is_number(value: object) -> bool:
     """Whether `value` is an integer or float (not a Boolean) that a double holds as a finite number."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
@@ -33,13 +30,15 @@ def _is_number(value: object) -> bool:
         return False
 
 
-def number(unit: str, allowed: str, low: float = -math.inf, *, open_low: bool = False) -> BeforeValidator:
-    """Returns a pydantic validator for one finite number above (or at) `low`; `allowed` says so in words."""
+def number(
+    unit: str, allowed: str, low: float = -math.inf, high: float = math.inf, *, open_low: bool = False
+) -> BeforeValidator:
+    """Returns a pydantic validator for one finite number from `low` to `high`; `allowed` says so in words."""
 
     def check(value: object) -> float:
-        if _is_number(value):
+        if is_number(value):
             x = float(value)  # type: ignore[arg-type]
-            if x > low or (x == low and not open_low):
+            if (x > low or (x == low and not open_low)) and x <= high:
                 return x
         raise ValueError(f" = {quantity(value, unit)}: must be {allowed}")
 
@@ -53,7 +52,7 @@ def vector(unit: str, allowed: str, size: int = 3, low: float = -math.inf) -> Be
         if (
             isinstance(value, list | tuple)
             and len(value) == size
-            and all(_is_number(element) and float(element) >= low for element in value)
+            and all(is_number(element) and float(element) >= low for element in value)
         ):
             return tuple(float(element) for element in value)
         raise ValueError(f" = {quantity(value, unit)}: must be {allowed}")
@@ -68,7 +67,7 @@ def _tensor(value: object) -> Matrix:
         isinstance(value, list | tuple)
         and len(value) == 3
         and all(
-            isinstance(row, list | tuple) and len(row) == 3 and all(_is_number(x) for x in row)
+            isinstance(row, list | tuple) and len(row) == 3 and all(is_number(x) for x in row)
             for row in value
         )
     ):
@@ -94,9 +93,7 @@ def triangle_problem(moments: Vector) -> str:
     excess = large - (small + middle)
     if excess <= TRIANGLE_SLACK * large:
         return ""
-    return (
-        f"{large:.17g} exceeds {small:.17g} + {middle:.17g} by {excess:.6g}; no rigid body has these moments"
-    )
+    return f"{large} exceeds {small} + {middle} by {excess:.6g}; no rigid body has these moments"
 
 
 def tensor_problem(tensor: NDArray[np.float64]) -> str:
@@ -115,30 +112,6 @@ def tensor_problem(tensor: NDArray[np.float64]) -> str:
     return ""
 
 
-def definite_problem(tensor: NDArray[np.float64]) -> str:
-    """Returns why Euler's equations cannot be solved with this tensor, (3, 3) [kg m2], or "" if they can.
-
-    A pivot of the L D L^T factorisation that is lost in the rounding of its own diagonal element means
-    that the tensor is singular as far as doubles can tell; the generated model applies the same test.
-    """
-    pivots, diagonal = ldl_pivots(tensor), np.diag(tensor)
-    if np.all(np.isfinite(pivots)) and np.all(pivots > PIVOT_SLACK * diagonal):
-        return ""
-    moments = np.linalg.eigvalsh(tensor) if np.all(np.isfinite(tensor)) else np.diag(tensor)
-    three = ", ".join(f"{moment:.10g}" for moment in moments)
-    return f"principal moments {three} kg m2: must be positive and finite"
-
-
-def ldl_pivots(tensor: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns D of J = L D L^T, (3,), for a symmetric (3, 3) tensor; not finite where a pivot is zero."""
-    with np.errstate(all="ignore"):
-        l21, l31 = tensor[0, 1] / tensor[0, 0], tensor[0, 2] / tensor[0, 0]
-        d2 = tensor[1, 1] - l21 * tensor[0, 1]
-        l32 = (tensor[1, 2] - l31 * tensor[0, 1]) / d2
-        d3 = tensor[2, 2] - l31 * tensor[0, 2] - l32 * (tensor[1, 2] - l31 * tensor[0, 1])
-    return np.array([tensor[0, 0], d2, d3])
-
-
 def _pmi(value: Any) -> Vector:
     problem = triangle_problem(value)
     if problem:
@@ -147,16 +120,32 @@ def _pmi(value: Any) -> Vector:
     return k1, k2, k3
 
 
+def vector_length(v: Vector) -> float:
+    """Returns the length of a vector, without under- or overflow."""
+    return math.hypot(*v)
+
+
+def _direction(value: Any) -> Vector:
+    if not any(value):
+        raise ValueError(f" = {quantity(value)}: must have a length greater than 0")
+    x, y, z = value
+    return x, y, z
+
+
 Mass = Annotated[float, number("kg", "a finite number >= 0", 0.0)]
 Pmi = Annotated[
     Vector, BeforeValidator(_pmi), vector("m2", "three finite numbers >= 0", low=0.0)
 ]  # validators run from the right
 Tensor = Annotated[Matrix, BeforeValidator(_tensor)]
 Position = Annotated[Vector, vector("m", "three finite numbers")]
-Direction = Annotated[Vector, vector("", "three finite numbers, a direction of any length > 0")]
+Direction = Annotated[
+    Vector,
+    BeforeValidator(_direction),
+    vector("", "three finite numbers, a direction of any length > 0"),
+]
 AngularVelocity = Annotated[Vector, vector("rad/s", "three finite numbers")]
 Seconds = Annotated[float, number("s", "a finite number > 0", 0.0, open_low=True)]
-Angle = Annotated[float, number("rad", "a finite number > 0", 0.0, open_low=True)]
+Angle = Annotated[float, number("rad", "a number from 1e-6 to 1", 1e-6, 1.0)]
 Tolerance = Annotated[float, number("", "a finite number > 0", 0.0, open_low=True)]
 Bounds = Annotated[tuple[float, float], vector("", "two finite numbers [low, high]", size=2)]
 

@@ -4,12 +4,10 @@ Every number is in SI units. The classes hold what a scene file says, checked on
 `supervessel.loading` reads files and checks what the tables say of each other.
 """
 
-import math
-from collections.abc import Iterable
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from supervessel.problems import quantity
 from supervessel.quantities import (
@@ -47,16 +45,27 @@ OUTPUT_NAMES = (
 )
 
 
+VARIABLE_UNITS = {
+    "mass": "kg",
+    "pmi": "m2",
+    "position": "m",
+    "direction": "",
+    "alignment": "",
+    "torque": "N.m",
+    "barycentre": "m",
+    "inertia": "kg.m2",
+    "angular_velocity": "rad/s",
+    "attitude": "",
+    "kinetic_energy": "J",
+    "angular_momentum": "N.m.s",
+}
+"""Units of inputs and outputs by the last part of their names, as FMI writes them; "" for a pure number."""
+
+
 class Table(BaseModel):
     """A table of a scene file: unknown keys are refused, values never change once read."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True)
-
-
-def _refuse(problems: list[tuple[str, str]]) -> None:
-    """Raises what a table's keys say of each other, as pairs (key, text), if there is any."""
-    if problems:
-        raise PydanticCustomError("table", "inconsistent", {"problems": problems})
 
 
 def _text(value: object) -> object:
@@ -100,35 +109,6 @@ class Port(Table):
     direction: Direction
     alignment: Direction
 
-    @model_validator(mode="after")
-    def _check_directions(self) -> Self:
-        problems = [
-            (key, f" = {quantity(value)}: must have a length greater than 0")
-            for key, value in (("direction", self.direction), ("alignment", self.alignment))
-            if not any(value)
-        ]
-        _refuse(problems)
-        sine, cosine = _sine_cosine(self.direction, self.alignment)
-        where = (
-            f" = {quantity(self.alignment)}: must be perpendicular to direction = {quantity(self.direction)}"
-        )
-        if sine < PARALLEL_LIMIT:
-            _refuse([("alignment", f"{where}, but is parallel to it within {PARALLEL_LIMIT:g} rad")])
-        if abs(math.atan2(cosine, sine)) > PERPENDICULAR_LIMIT:
-            off = abs(math.atan2(cosine, sine))
-            _refuse(
-                [("alignment", f"{where}, but is {off:.6g} rad off; at most {PERPENDICULAR_LIMIT:g} rad")]
-            )
-        return self
-
-
-def _sine_cosine(a: Vector, b: Vector) -> tuple[float, float]:
-    """Returns sine and cosine of the angle between two vectors of any length > 0."""
-    a, b = (tuple(x / max(map(abs, v)) for x in v) for v in (a, b))  # type: ignore[assignment]
-    cross = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-    length = math.hypot(*a) * math.hypot(*b)
-    return math.hypot(*cross) / length, sum(x * y for x, y in zip(a, b, strict=True)) / length
-
 
 class Vessel(Table):
     """A rigid part: mass [kg], moments about its centre of mass, centre of mass [m] in vessel axes, ports.
@@ -142,16 +122,6 @@ class Vessel(Table):
     inertia: Tensor | None = None
     centre_of_mass: Position = ORIGIN
     ports: dict[str, Port] = Field(default_factory=dict)
-
-    @model_validator(mode="after")
-    def _check_moments(self) -> Self:
-        if self.pmi is None and self.inertia is None:
-            _refuse([("pmi", ": missing; a vessel needs pmi [m2] or inertia [kg m2]")])
-        if self.pmi is not None and self.inertia is not None:
-            _refuse([("inertia", ": given beside pmi; a vessel takes one of the two")])
-        if self.inertia is not None and self.mass == 0.0:
-            _refuse([("mass", " = 0.0 kg: must be > 0 for a vessel given by inertia; inertia/mass is kept")])
-        return self
 
     @property
     def specific_inertia(self) -> Matrix:
@@ -195,12 +165,6 @@ class Experiment(Table):
 
     duration: Seconds
     step: Seconds
-
-    @model_validator(mode="after")
-    def _check_step(self) -> Self:
-        if self.step > self.duration:
-            _refuse([("step", f" = {self.step} s: must not exceed duration = {self.duration} s")])
-        return self
 
 
 class Outputs(Table):
@@ -246,6 +210,13 @@ def known_keys(place: tuple[Any, ...]) -> list[str]:
         if len(pattern) == len(place) and all(p in ("*", q) for p, q in zip(pattern, place, strict=True)):
             return list(table.model_fields)
     return []
+
+
+def tables(raw: Any, key: str) -> list[tuple[str, Mapping[str, Any]]]:
+    """Returns names and tables under a key of a raw table, without what is no table."""
+    value = raw.get(key) if isinstance(raw, Mapping) else None
+    found = value.items() if isinstance(value, Mapping) else ()
+    return [(name, table) for name, table in found if isinstance(table, Mapping)]
 
 
 def input_groups(

@@ -1,31 +1,14 @@
 """The twin: the FMU's own equations as CasADi functions, for control design and estimation."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from supervessel.equations import UPPER_TRIANGLE, Equations, composite_slices, equations
-from supervessel.inertia import symmetric
+from supervessel.equations import Equations, composite_slices, equations, p_start, simplification
+from supervessel.inertia import from_upper_triangle
 from supervessel.scene import Scene
-from supervessel.variables import input_variables
-
-
-@contextmanager
-def _as_written() -> Iterator[None]:
-    """Composes expressions without rewriting them.
-
-    CasADi turns x * (1/y) into x/y when the two meet in one graph. The FMU computes 1/y once for each
-    change of inertia, so the twin must multiply by it as well to give the same last bit.
-    """
-    ca.GlobalOptions.setSimplificationOnTheFly(False)
-    try:
-        yield
-    finally:
-        ca.GlobalOptions.setSimplificationOnTheFly(True)
 
 
 class Twin:
@@ -62,15 +45,16 @@ class Twin:
         self.u = ca.SX.sym("u", len(self.u_names))
         self.x = ca.SX.sym("x", len(self.x_names))
         self.h = ca.SX.sym("h")
-        with _as_written():
+        # CasADi turns x * (1/y) into x/y when the two meet in one graph. The FMU computes 1/y once for each
+        # change of inertia, so the twin must multiply by it as well to give the same last bit.
+        with simplification(False):
             self._compose(model)
 
     def _compose(self, model: Equations) -> None:
         """Makes functions of p out of those of c."""
         c = model.composite(self.p)
         where = composite_slices()
-        elements = dict(zip(UPPER_TRIANGLE, ca.vertsplit(c[where["inertia"]]), strict=True))
-        inertia = symmetric(lambda i, j: elements[i, j])
+        inertia = from_upper_triangle(c[where["inertia"]])
         args, names = [self.x, self.u, self.p], ["x", "u", "p"]
         self.composite = ca.Function(
             "composite",
@@ -81,7 +65,8 @@ class Twin:
         )
         at = (self.x, self.u, c)
         self.ode = ca.Function("ode", args, [model.ode(*at)], names, ["x_dot"])
-        self.longest_step = ca.Function("longest_step", args, [model.longest_step(*at)], names, ["h_max"])
+        longest = self.scene.rotation.max_angle_step / ca.sqrt(model.fastest_square(*at))
+        self.longest_step = ca.Function("longest_step", args, [longest], names, ["h_max"])
         self.step = ca.Function("step", [*args, self.h], [model.step(*at, self.h)], [*names, "h"], ["x_next"])
         self.outputs = ca.Function("outputs", args, [model.outputs(*at)], names, ["y"])
 
@@ -94,4 +79,4 @@ class Twin:
     @cached_property
     def p_start(self) -> NDArray[np.float64]:
         """The scene's values of p, (n,)."""
-        return np.array([v.start for v in input_variables(self.scene) if v.name in self.p_names])
+        return p_start(self.scene)

@@ -2,8 +2,12 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from math import hypot, isfinite
 
-from supervessel.scene import Scene, input_groups
+import numpy as np
+
+from supervessel import reference
+from supervessel.scene import VARIABLE_UNITS, Scene, input_groups
 
 
 @dataclass(frozen=True)
@@ -13,7 +17,8 @@ class Variable:
     name  : structured, `DG.nose.position[1]`; elements of vectors and tensors carry indices from 1
     unit  : as FMI writes it, "" for a pure number
     start : value at the start, None for what is calculated
-    low, high : the range that the scene gives, None where it gives none
+    low, high : the range that the scene gives, else what is possible at all, None where all is
+    nominal : its magnitude, for an importer's solver
     """
 
     name: str
@@ -22,6 +27,7 @@ class Variable:
     start: float | None = None
     low: float | None = None
     high: float | None = None
+    nominal: float = 1.0
 
     @property
     def group(self) -> str:
@@ -35,21 +41,6 @@ class InputVariable(Variable):
 
     start: float = 0.0
 
-
-UNITS = {
-    "mass": "kg",
-    "pmi": "m2",
-    "position": "m",
-    "direction": "",
-    "alignment": "",
-    "torque": "N.m",
-    "barycentre": "m",
-    "inertia": "kg.m2",
-    "angular_velocity": "rad/s",
-    "attitude": "",
-    "kinetic_energy": "J",
-    "angular_momentum": "N.m.s",
-}
 
 AXES = ("x", "y", "z")
 QUATERNION = ("w", "x", "y", "z")
@@ -65,7 +56,9 @@ OUTPUT_DESCRIPTIONS = {
     "angular_momentum": "angular momentum about the barycentre, inertial axes",
 }
 
-STATE_SIZES = {"attitude": 4, "angular_velocity": 3}
+STATES = {"attitude": QUATERNION, "angular_velocity": AXES}
+
+RATE_UNITS = {"": "1/s", "rad/s": "rad/s2"}
 
 
 def input_variables(scene: Scene) -> tuple[InputVariable, ...]:
@@ -76,10 +69,11 @@ def input_variables(scene: Scene) -> tuple[InputVariable, ...]:
         owner, _, kind = group.rpartition(".")
         for index in range(1, size + 1) if size else (0,):
             name = f"{group}[{index}]" if index else group
-            low, high = inputs.range.get(name, inputs.range.get(group, (None, None)))
+            lowest = 0.0 if kind in ("mass", "pmi") else None
+            low, high = inputs.range.get(name, inputs.range.get(group, (lowest, None)))
             start = _start(scene, owner, kind, index)
             description = _input_description(owner, kind, index)
-            variables.append(InputVariable(name, UNITS[kind], description, start, low, high))
+            variables.append(InputVariable(name, VARIABLE_UNITS[kind], description, start, low, high))
     return tuple(variables)
 
 
@@ -133,11 +127,31 @@ def parameter_variables(scene: Scene) -> tuple[InputVariable, ...]:
 
 def output_variables(scene: Scene) -> tuple[Variable, ...]:
     """Returns the outputs that the scene lists, in its order, vectors and tensors element by element."""
+    nominal = _output_nominals(scene)
     return tuple(
-        Variable(name, UNITS[group], f"{OUTPUT_DESCRIPTIONS[group]}{label}")
+        Variable(
+            name,
+            VARIABLE_UNITS[group],
+            f"{OUTPUT_DESCRIPTIONS[group]}{label}",
+            nominal=_usable(nominal.get(group, 1.0)),
+        )
         for group in scene.outputs.names
         for name, label in _elements(group)
     )
+
+
+def _output_nominals(scene: Scene) -> dict[str, float]:
+    """Returns magnitudes of outputs at the start."""
+    whole = reference.composite(scene)
+    moment, rate = float(np.trace(whole.inertia)) / 3.0, _rate(scene)
+    return {
+        "mass": whole.mass,
+        "pmi": moment / whole.mass,
+        "inertia": moment,
+        "angular_velocity": rate,
+        "kinetic_energy": 0.5 * moment * rate * rate,
+        "angular_momentum": moment * rate,
+    }
 
 
 def _elements(group: str) -> Iterable[tuple[str, str]]:
@@ -154,6 +168,33 @@ def _elements(group: str) -> Iterable[tuple[str, str]]:
             yield f"{group}[{i}]", f", {label}"
 
 
-def state_names() -> tuple[str, ...]:
-    """Returns the names of the seven states: attitude (w, x, y, z), then angular velocity."""
-    return tuple(f"state.{group}[{i}]" for group, size in STATE_SIZES.items() for i in range(1, size + 1))
+def state_variables(scene: Scene) -> tuple[Variable, ...]:
+    """Returns the seven states: attitude (w, x, y, z), then angular velocity (x, y, z) in body axes."""
+    return tuple(
+        Variable(
+            f"state.{group}[{i}]",
+            VARIABLE_UNITS[group],
+            f"state: {OUTPUT_DESCRIPTIONS[group]}, {label}",
+            nominal=_rate(scene) if group == "angular_velocity" else 1.0,
+        )
+        for group, labels in STATES.items()
+        for i, label in enumerate(labels, start=1)
+    )
+
+
+def derivative_variables(scene: Scene) -> tuple[Variable, ...]:
+    """Returns the rates of the seven states."""
+    return tuple(
+        Variable(f"der({state.name})", RATE_UNITS[state.unit], f"rate of {state.name}")
+        for state in state_variables(scene)
+    )
+
+
+def _usable(nominal: float) -> float:
+    """Returns a magnitude, 1 where it would be none: zero or beyond all doubles."""
+    return nominal if isfinite(nominal) and nominal > 0.0 else 1.0
+
+
+def _rate(scene: Scene) -> float:
+    """Returns the magnitude of the angular velocity [rad/s]: the scene's at the start, or 1 from rest."""
+    return hypot(*scene.rotation.angular_velocity) or 1.0

@@ -1,0 +1,103 @@
+"""What the keys of a scene say of each other: moments, port directions, ranges, steps, the total mass.
+
+Works on the raw tables of a file and passes over what is no number, so that these problems are reported
+beside others.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from supervessel.problems import quantity
+from supervessel.quantities import Vector, is_number, vector_length
+from supervessel.scene import PARALLEL_LIMIT, PERPENDICULAR_LIMIT, VARIABLE_UNITS, tables
+
+
+def consistency_problems(raw: Mapping[str, Any]) -> list[str]:
+    """Returns what is wrong between the values of a scene, given as the raw tables of its file."""
+    problems: list[str] = []
+    for name, vessel in tables(raw, "vessels"):
+        problems += _moments(f"vessels.{name}", vessel)
+        for port, table in tables(vessel, "ports"):
+            problems += _directions(f"vessels.{name}.ports.{port}", table)
+    return [*problems, *_experiment(raw), *_ranges(raw), *_total_mass(raw)]
+
+
+def _moments(place: str, vessel: Mapping[str, Any]) -> Iterator[str]:
+    if "pmi" not in vessel and "inertia" not in vessel:
+        yield f"{place}.pmi: missing; a vessel needs pmi [m2] or inertia [kg m2]"
+    if "pmi" in vessel and "inertia" in vessel:
+        yield f"{place}.inertia: given beside pmi; a vessel takes one of the two"
+    elif "inertia" in vessel and _number(vessel, "mass") == 0.0:
+        yield f"{place}.mass = 0.0 kg: must be > 0 for a vessel given by inertia; inertia/mass is kept"
+
+
+def _directions(place: str, port: Mapping[str, Any]) -> Iterator[str]:
+    """Yields why a port's alignment cannot be used with its direction."""
+    direction, alignment = _vector(port, "direction"), _vector(port, "alignment")
+    if direction is None or alignment is None:
+        return
+    sine, cosine = _sine_cosine(direction, alignment)
+    off = abs(math.atan2(cosine, sine))
+    against = f"must be perpendicular to direction = {quantity(direction)}"
+    where = f"{place}.alignment = {quantity(alignment)}: {against}"
+    if sine < PARALLEL_LIMIT:
+        yield f"{where}, but is parallel to it within {PARALLEL_LIMIT:g} rad"
+    elif off > PERPENDICULAR_LIMIT:
+        yield f"{where}, but is {off:.9g} rad off; at most {PERPENDICULAR_LIMIT:g} rad"
+
+
+def _vector(table: Mapping[str, Any], key: str) -> Vector | None:
+    """Returns three finite numbers that are not all zero, None where there is something else."""
+    value = table.get(key)
+    if isinstance(value, list | tuple) and len(value) == 3 and all(map(is_number, value)) and any(value):
+        x, y, z = map(float, value)
+        return x, y, z
+    return None
+
+
+def _sine_cosine(a: Vector, b: Vector) -> tuple[float, float]:
+    """Returns sine and cosine of the angle between two vectors of any length > 0."""
+    (a1, a2, a3), (b1, b2, b3) = (tuple(x / vector_length(v) for x in v) for v in (a, b))
+    cross = (a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1)
+    return math.hypot(*cross), a1 * b1 + a2 * b2 + a3 * b3
+
+
+def _experiment(raw: Mapping[str, Any]) -> Iterator[str]:
+    experiment = raw.get("experiment")
+    if isinstance(experiment, Mapping):
+        duration, step = _number(experiment, "duration"), _number(experiment, "step")
+        if step > duration > 0.0:
+            yield f"experiment.step = {step} s: must not exceed duration = {duration} s"
+
+
+def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:
+    inputs = raw.get("inputs")
+    ranges = inputs.get("range") if isinstance(inputs, Mapping) else None
+    for name, bounds in ranges.items() if isinstance(ranges, Mapping) else ():
+        if not (isinstance(bounds, list | tuple) and len(bounds) == 2 and all(map(is_number, bounds))):
+            continue
+        low, high = map(float, bounds)
+        kind = name.rpartition(".")[2].partition("[")[0]
+        path = f'inputs.range."{name}" = {quantity((low, high), VARIABLE_UNITS.get(kind, ""))}'
+        if low > high:
+            yield f"{path}: low must not exceed high"
+        elif kind == "mass" and low < 0.0:
+            yield f"{path}: a mass must be >= 0 kg"
+        elif kind == "pmi" and low < 0.0:
+            yield f"{path}: a moment must be >= 0 m2"
+
+
+def _total_mass(raw: Mapping[str, Any]) -> Iterator[str]:
+    masses = [_number(vessel, "mass") for _, vessel in tables(raw, "vessels") if "inertia" not in vessel]
+    masses += [
+        _number(vessel, "mass") or math.nan for _, vessel in tables(raw, "vessels") if "inertia" in vessel
+    ]
+    if masses and all(mass >= 0.0 for mass in masses) and not 0.0 < sum(masses) < math.inf:
+        yield f"vessels: total mass = {sum(masses)} kg: must be a finite number > 0"
+
+
+def _number(table: Mapping[str, Any], key: str) -> float:
+    """Returns a finite number, NaN where there is something else."""
+    value = table.get(key)
+    return float(value) if is_number(value) else math.nan  # type: ignore[arg-type]
