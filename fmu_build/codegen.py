@@ -1,9 +1,10 @@
 """C that is particular to a scene: the generated equations, the variable table and the scene's numbers."""
 
 import hashlib
+import re
 import tempfile
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import casadi as ca
@@ -13,23 +14,11 @@ from fmu_build.table import Entry
 from supervessel.equations import Equations, composite_slices
 from supervessel.scene import Scene
 
-CAUSALITIES = {
-    "independent": "CAUSALITY_INDEPENDENT",
-    "input": "CAUSALITY_INPUT",
-    "parameter": "CAUSALITY_PARAMETER",
-    "output": "CAUSALITY_OUTPUT",
-}
-
-
-def compiled_functions(model: Equations) -> tuple[ca.Function, ...]:
-    """Returns the functions that the FMU calls."""
-    return model.composite, model.longest_step, model.step, model.outputs
-
 
 def model_source(model: Equations) -> str:
     """Returns model.c: the scene's equations as C functions without external symbols of their own."""
     generator = ca.CodeGenerator("model.c", {"with_export": False, "casadi_int": "int", "verbose": False})
-    for function in compiled_functions(model):
+    for function in model.functions:
         generator.add(function)
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -37,7 +26,17 @@ def model_source(model: Equations) -> str:
         source = (Path(folder) / "model.c").read_text()
     if "#error" in source:
         raise BuildError("the equations hold something that cannot be generated as C")
-    return '#include "model.h"\n\n' + source
+    return '#include "model.h"\n\n' + _without_null_checks(source)
+
+
+def _without_null_checks(source: str) -> str:
+    """Returns generated C that takes every argument and result for given, as the C layer always does.
+
+    CasADi lets a caller leave out an argument (then zero) or a result, and asks at each element: an eighth
+    of the time of a step.
+    """
+    source = re.sub(r"=arg\[(\d+)\]\? arg\[\1\]\[(\d+)\] : 0;", r"=arg[\1][\2];", source)
+    return re.sub(r"if \(res\[(\d+)\]!=0\) res\[\1\]", r"res[\1]", source)
 
 
 def scene_header(scene: Scene, model: Equations, entries: Sequence[Entry]) -> str:
@@ -45,16 +44,21 @@ def scene_header(scene: Scene, model: Equations, entries: Sequence[Entry]) -> st
     where = composite_slices()
     references = {entry.variable.name: entry.reference for entry in entries}
     p_count, u_count = len(model.p_names), len(model.u_names)
-    sizes = [(f.sz_arg(), f.sz_res(), f.sz_iw(), f.sz_w()) for f in compiled_functions(model)]
+    sizes = [(f.sz_arg(), f.sz_res(), f.sz_iw(), f.sz_w()) for f in model.functions]
     arg, res, iw, w = (max(1, *column) for column in zip(*sizes, strict=True))
     constants = {
         "VARIABLE_COUNT": len(entries),
         "INPUT_P_COUNT": p_count,
+        "INPUT_U_COUNT": u_count,
+        "REFERENCE_TIME": 0,
         "REFERENCE_P": 1,
         "REFERENCE_TORQUE": 1 + p_count,
         "REFERENCE_RATE_START": references["angular_velocity_start[1]"],
         "REFERENCE_ATTITUDE_START": references["attitude_start[1]"],
         "REFERENCE_OUTPUTS": 1 + p_count + u_count + 7,
+        "OUTPUT_COUNT": len(model.y_names),
+        "REFERENCE_STATES": references["state.attitude[1]"],
+        "REFERENCE_DERIVATIVES": references["der(state.attitude[1])"],
         "STATE_COUNT": len(model.x_names),
         "COMPOSITE_COUNT": model.composite.numel_out(0),
         "COMPOSITE_MASS": where["mass"].start,
@@ -78,12 +82,10 @@ def scene_header(scene: Scene, model: Equations, entries: Sequence[Entry]) -> st
     )
 
 
-def scene_source(entries: Sequence[Entry], shaping: frozenset[int], token: str) -> str:
-    """Returns scene.c: the variable table with start values, and the token.
-
-    shaping : references of the composite's inputs
-    """
-    rows = "\n".join(f"    {_row(entry, shaping)}," for entry in entries)
+def scene_source(entries: Sequence[Entry], token: str) -> str:
+    """Returns scene.c: the variable table with start values, and the token."""
+    needs = {entry.reference: _needs(entry) for entry in entries}
+    rows = "\n".join(f"    {_row(entry, needs)}," for entry in entries)
     return (
         "/* Generated: the scene's variables, by value reference. */\n"
         '#include "variables.h"\n\n'
@@ -92,23 +94,39 @@ def scene_source(entries: Sequence[Entry], shaping: frozenset[int], token: str) 
     )
 
 
-def _row(entry: Entry, shaping: frozenset[int]) -> str:
+def _needs(entry: Entry) -> frozenset[str]:
+    """Returns what must be current before that which follows from a variable can be read."""
+    if entry.role == "state":
+        return frozenset({"STATES", "ATTITUDE"} if "attitude" in entry.variable.name else {"STATES"})
+    if entry.role == "input" and entry.variable.group != "torque":
+        return frozenset({"COMPOSITE"})
+    return frozenset()
+
+
+def _row(entry: Entry, needs: Mapping[int, frozenset[str]]) -> str:
+    """Returns a row of the table; `needs` are those of all variables by reference."""
     variable = entry.variable
-    shapes = entry.reference in shaping or not shaping.isdisjoint(entry.dependencies)
+    own = {
+        "output": frozenset({"OUTPUTS"}),
+        "derivative": frozenset({"RATES"}),
+        "state": needs[entry.reference],
+    }
+    flags = sorted(own.get(entry.role, frozenset()).union(*(needs[d.reference] for d in entry.dependencies)))
     fields = [
         f'"{variable.name}"',
         f'"{variable.unit}"',
         repr(variable.start or 0.0),
-        CAUSALITIES[entry.causality],
+        repr(variable.nominal),
+        f"ROLE_{entry.role.upper()}",
         _check(entry),
-        "true" if shapes else "false",
+        " | ".join(f"FOLLOWS_{flag}" for flag in flags) or "0",
     ]
     return "{" + ", ".join(fields) + "}"
 
 
 def _check(entry: Entry) -> str:
     """Returns which check stands at a variable: at the first of those that are judged together."""
-    if entry.causality == "input":
+    if entry.role == "input":
         for ending, check in (
             (".mass", "CHECK_MASS"),
             (".pmi[1]", "CHECK_PMI"),

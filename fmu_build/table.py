@@ -3,62 +3,122 @@
 The modelDescription.xml and the C layer are both written from it.
 """
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import casadi as ca
-import numpy as np
 
 from supervessel.equations import Equations
 from supervessel.scene import Scene
-from supervessel.variables import Variable, input_variables, output_variables, parameter_variables
+from supervessel.variables import (
+    Variable,
+    derivative_variables,
+    input_variables,
+    output_variables,
+    parameter_variables,
+    state_variables,
+)
 
-Causality = Literal["independent", "input", "parameter", "output"]
+Role = Literal["time", "input", "parameter", "output", "state", "derivative"]
+Kind = Literal["constant", "dependent"]
+
+
+@dataclass(frozen=True)
+class Dependency:
+    """What a variable depends on: a value reference, and how; "constant" is linear with a fixed factor."""
+
+    reference: int
+    kind: Kind
 
 
 @dataclass(frozen=True)
 class Entry:
     """A variable of the FMU.
 
-    reference            : value reference, the variable's place in the table
-    dependencies         : references of the inputs that the output depends on, at a communication point
-    initial_dependencies : those of the inputs and start parameters that it depends on at the start
+    reference    : value reference, the variable's place in the table
+    dependencies : inputs and states that an output or a derivative depends on
+    initial      : inputs and start parameters that an output, a state or a derivative depends on at the start
     """
 
     variable: Variable
     reference: int
-    causality: Causality
-    dependencies: tuple[int, ...] = ()
-    initial_dependencies: tuple[int, ...] = ()
+    role: Role
+    dependencies: tuple[Dependency, ...] = ()
+    initial: tuple[Dependency, ...] = ()
 
 
 TIME = Variable("time", "s", "simulation time")
 
 
 def variable_table(scene: Scene, model: Equations) -> tuple[Entry, ...]:
-    """Returns the FMU's variables: time, inputs (p, then torque), start parameters, outputs."""
-    inputs, parameters = input_variables(scene), parameter_variables(scene)
-    first_parameter = 1 + len(inputs)
-    first_output = first_parameter + len(parameters)
-    entries = [Entry(TIME, 0, "independent")]
-    entries += [Entry(v, i, "input") for i, v in enumerate(inputs, start=1)]
-    entries += [Entry(v, i, "parameter") for i, v in enumerate(parameters, start=first_parameter)]
-    by_state, by_input = _sparsity(model)
-    rates, attitude = range(first_parameter, first_parameter + 3), range(first_parameter + 3, first_output)
-    for row, variable in enumerate(output_variables(scene)):
-        now = tuple(int(column) + 1 for column in np.flatnonzero(by_input[row]))
-        start = set(now)
-        if by_state[row, :4].any():
-            start |= set(attitude)
-        start |= {rates[i] for i in range(3) if by_state[row, 4 + i]}
-        entries.append(Entry(variable, first_output + row, "output", now, tuple(sorted(start))))
+    """Returns the variables: time, inputs (p, then torque), start parameters, outputs, states, rates."""
+    groups: dict[Role, Sequence[Variable]] = {
+        "time": (TIME,),
+        "input": input_variables(scene),
+        "parameter": parameter_variables(scene),
+        "output": output_variables(scene),
+        "state": state_variables(scene),
+        "derivative": derivative_variables(scene),
+    }
+    first: dict[Role, int] = {}
+    count = 0
+    for role, variables in groups.items():
+        first[role] = count
+        count += len(variables)
+    knowns = [*range(first["state"], first["state"] + 7)]
+    knowns += range(first["input"], first["input"] + len(groups["input"]))
+    by_role = _dependencies(model, knowns)
+    entries = []
+    for role, variables in groups.items():
+        for i, variable in enumerate(variables):
+            now = by_role[role][i] if role in ("output", "derivative") else ()
+            start = now
+            if role == "state":
+                start = (Dependency(first["state"] + i, "constant"),)
+            initial = _at_start(start, first["state"], first["parameter"])
+            entries.append(Entry(variable, first[role] + i, role, now, initial))
     return tuple(entries)
 
 
-def _sparsity(model: Equations) -> tuple[np.ndarray, np.ndarray]:
-    """Returns which outputs depend on which states, (ny, 7), and on which inputs (p, u), (ny, np + nu)."""
+def _dependencies(model: Equations, knowns: Sequence[int]) -> dict[Role, list[tuple[Dependency, ...]]]:
+    """Returns the dependencies of each output and each derivative on states and inputs.
+
+    knowns : value references of states and inputs (p, u)
+    """
     p, u, x = (ca.SX.sym(*s) for s in (("p", len(model.p_names)), ("u", len(model.u_names)), ("x", 7)))
-    y = model.outputs(x, u, model.composite(p))
-    by_state = np.array(ca.DM(ca.jacobian_sparsity(y, x), 1.0)) != 0.0
-    by_input = np.array(ca.DM(ca.jacobian_sparsity(y, ca.vertcat(p, u)), 1.0)) != 0.0
-    return by_state.reshape(y.numel(), 7), by_input.reshape(y.numel(), p.numel() + u.numel())
+    c = model.composite(p)
+    known = ca.vertcat(x, p, u)
+    unknowns: dict[Role, ca.SX] = {"output": model.outputs(x, u, c), "derivative": model.ode(x, u, c)}
+    return {role: _rows(ca.jacobian(unknown, known), knowns) for role, unknown in unknowns.items()}
+
+
+def _rows(jacobian: ca.SX, knowns: Sequence[int]) -> list[tuple[Dependency, ...]]:
+    """Returns the dependencies that the structure of a Jacobian shows, row by row."""
+    rows: list[list[Dependency]] = [[] for _ in range(jacobian.size1())]
+    for row, column in zip(*jacobian.sparsity().get_triplet(), strict=True):
+        element = jacobian[row, column]
+        if not element.is_zero():
+            rows[row].append(Dependency(knowns[column], "constant" if element.is_constant() else "dependent"))
+    return [tuple(sorted(row, key=lambda d: d.reference)) for row in rows]
+
+
+def _at_start(now: Iterable[Dependency], first_state: int, first_parameter: int) -> tuple[Dependency, ...]:
+    """Returns dependencies with the states replaced by the start parameters that they follow from.
+
+    The attitude follows from all four of attitude_start, which are normalised, the rate from its own element.
+    """
+    rates, attitude = (
+        range(first_parameter, first_parameter + 3),
+        range(first_parameter + 3, first_parameter + 7),
+    )
+    found: dict[int, Kind] = {}
+    for dependency in now:
+        state = dependency.reference - first_state
+        if not 0 <= state < 7:
+            found[dependency.reference] = dependency.kind
+        elif state < 4:
+            found |= dict.fromkeys(attitude, "dependent")
+        else:
+            found[rates[state - 4]] = dependency.kind
+    return tuple(Dependency(reference, found[reference]) for reference in sorted(found))

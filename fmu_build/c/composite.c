@@ -1,5 +1,7 @@
 #include <float.h>
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "instance.h"
@@ -11,9 +13,9 @@ static const double TRIANGLE_SLACK = 2.0 * DBL_EPSILON;
 /* Sine of the angle between a port's directions below which alignment says nothing. */
 static const double PARALLEL_LIMIT = 1e-6;
 
-/* Squares of lengths within these bounds neither under- nor overflow. */
-static const double SHORTEST = 1e-100;
-static const double LONGEST = 1e100;
+/* Fourth powers of lengths within these bounds neither under- nor overflow. */
+static const double SHORTEST = 1e-60;
+static const double LONGEST = 1e60;
 
 static Status check_mass(Instance *instance, const Variable *variable, const double *mass) {
     if (*mass >= 0.0) return STATUS_OK;
@@ -23,6 +25,17 @@ static Status check_mass(Instance *instance, const Variable *variable, const dou
 /* Length of the name of a vector without its index. */
 static int group_length(const Variable *element) {
     return (int)strcspn(element->name, "[");
+}
+
+enum { NUMBER_SIZE = 32 };
+
+/* Writes a number with as many digits as tell it from its neighbours. */
+static const char *all_digits(double value, char text[NUMBER_SIZE]) {
+    for (int digits = 6; digits <= 17; digits++) {
+        snprintf(text, NUMBER_SIZE, "%.*g", digits, value);
+        if (strtod(text, NULL) == value) break;
+    }
+    return text;
 }
 
 static Status check_pmi(Instance *instance, const Variable *variable, const double *k) {
@@ -35,28 +48,32 @@ static Status check_pmi(Instance *instance, const Variable *variable, const doub
                                variable->name, k[0], k[1], k[2]);
     const double excess = large - (small + middle);
     if (excess <= TRIANGLE_SLACK * large) return STATUS_OK;
+    char text[3][NUMBER_SIZE];
     return instance_refuse(instance,
-                           "%.*s = (%.10g, %.10g, %.10g) m2: %.17g exceeds %.17g + %.17g by %.6g; no rigid body "
-                           "has these moments",
-                           group_length(variable), variable->name, k[0], k[1], k[2], large, small, middle, excess);
+                           "%.*s = (%.10g, %.10g, %.10g) m2: %s exceeds %s + %s by %.6g; no rigid body has these "
+                           "moments",
+                           group_length(variable), variable->name, k[0], k[1], k[2], all_digits(large, text[0]),
+                           all_digits(small, text[1]), all_digits(middle, text[2]), excess);
 }
 
-/* Scales a vector by a power of two, exactly, so that its square is far from under- and overflow. */
-static double scale_vector(double v[3]) {
+/* Scales a vector by a power of two, exactly, so that its square is far from under- and overflow. Returns the
+   exponent of that power. */
+static int scale_vector(double v[3]) {
     const double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
+    int exponent = 0;
     if (largest > 0.0 && (largest < SHORTEST || largest > LONGEST)) {
-        int exponent;
         frexp(largest, &exponent);
         for (size_t i = 0; i < 3; i++) v[i] = ldexp(v[i], -exponent);
     }
-    return largest;
+    return -exponent;
 }
 
 /* Judges direction and alignment, which stand one after the other; p holds them and gets them scaled. */
 static Status check_port(Instance *instance, const Variable *variable, const double *values, double *p) {
     double *d = p, *a = p + 3;
     for (size_t i = 0; i < 6; i += 3) {
-        if (scale_vector(p + i) > 0.0) continue;
+        scale_vector(p + i);
+        if (p[i] != 0.0 || p[i + 1] != 0.0 || p[i + 2] != 0.0) continue;
         return instance_refuse(instance, "%.*s = (0, 0, 0): must have a length greater than 0",
                                group_length(&variable[i]), variable[i].name);
     }
@@ -73,13 +90,13 @@ static Status check_port(Instance *instance, const Variable *variable, const dou
 
 static Status check_inputs(Instance *instance) {
     Status status = STATUS_OK;
-    for (size_t i = 0; i < INPUT_P_COUNT && status == STATUS_OK; i++) {
-        const Variable *variable = &VARIABLES[REFERENCE_P + i];
-        const double *value = &instance->values[REFERENCE_P + i];
+    for (size_t i = REFERENCE_P; i < REFERENCE_TORQUE && status == STATUS_OK; i++) {
+        const Variable *variable = &VARIABLES[i];
+        const double *value = &instance->now.values[i];
         switch (variable->check) {
             case CHECK_MASS: status = check_mass(instance, variable, value); break;
             case CHECK_PMI: status = check_pmi(instance, variable, value); break;
-            case CHECK_PORT: status = check_port(instance, variable, value, &instance->p[i]); break;
+            case CHECK_PORT: status = check_port(instance, variable, value, &instance->now.p[i - REFERENCE_P]); break;
             case CHECK_NONE: break;
         }
     }
@@ -104,20 +121,33 @@ static Status check_composite(Instance *instance, const double *c) {
 }
 
 Status composite_refresh(Instance *instance) {
-    if (instance->composite_is_current) return STATUS_OK;
-    memcpy(instance->p, &instance->values[REFERENCE_P], INPUT_P_COUNT * sizeof(double));
+    Dynamics *now = &instance->now;
+    if (now->composite_is_current) return STATUS_OK;
+    memcpy(now->p, &now->values[REFERENCE_P], INPUT_P_COUNT * sizeof(double));
     Status status = check_inputs(instance);
     if (status != STATUS_OK) return status;
-    double c[COMPOSITE_COUNT];
-    instance->arg[0] = instance->p;
+    double *c = instance->variation.c;
+    instance->arg[0] = now->p;
     instance->res[0] = c;
     composite(instance->arg, instance->res, instance->iw, instance->w, 0);
     status = check_composite(instance, c);
     if (status != STATUS_OK) return status;
-    memcpy(instance->c, c, sizeof c);
-    instance->composite_is_current = true;
-    instance->outputs_are_current = false;
-    instance_inform(instance, LOG_COMPOSITE, "composite computed at %.10g s: mass = %.10g kg", instance->time,
+    memcpy(now->c, c, sizeof now->c);
+    now->composite_is_current = true;
+    instance->outputs_are_current = instance->rates_are_current = false;
+    instance_inform(instance, LOG_COMPOSITE, "composite computed at %.10g s: mass = %.10g kg", now->values[REFERENCE_TIME],
                     c[COMPOSITE_MASS]);
     return STATUS_OK;
+}
+
+void composite_scale_variation(const Instance *instance, double p[]) {
+    for (size_t i = REFERENCE_P; i < REFERENCE_TORQUE; i++) {
+        if (VARIABLES[i].check != CHECK_PORT) continue;
+        for (size_t k = i; k < i + 6; k += 3) {
+            double scaled[3];
+            memcpy(scaled, &instance->now.values[k], sizeof scaled);
+            const int exponent = scale_vector(scaled);
+            for (size_t n = k; n < k + 3; n++) p[n - REFERENCE_P] = ldexp(p[n - REFERENCE_P], exponent);
+        }
+    }
 }

@@ -8,8 +8,6 @@
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
 
-enum { ANY_STATE = INSTANTIATED | INITIALIZATION | STEPPING | TERMINATED };
-
 static fmi2Status unsupported(Instance *instance, const Call *call) {
     if (!instance || !instance_admits(instance, call)) return fmi2Error;
     return (fmi2Status)instance_error(instance, "belongs to a capability that this FMU does not have");
@@ -38,31 +36,9 @@ static fmi2Status other_type(Instance *instance, const Call *call, size_t count)
 
 OTHER_TYPES(DEFINE_ACCESSORS)
 
-#define UNSUPPORTED(X)                                                                                          \
-    X(GetFMUstate, (fmi2Component instance, fmi2FMUstate * state))                                              \
-    X(SetFMUstate, (fmi2Component instance, fmi2FMUstate state))                                                \
-    X(FreeFMUstate, (fmi2Component instance, fmi2FMUstate * state))                                             \
-    X(SerializedFMUstateSize, (fmi2Component instance, fmi2FMUstate state, size_t * size))                      \
-    X(SerializeFMUstate, (fmi2Component instance, fmi2FMUstate state, fmi2Byte bytes[], size_t size))           \
-    X(DeSerializeFMUstate, (fmi2Component instance, const fmi2Byte bytes[], size_t size, fmi2FMUstate * state)) \
-    X(GetDirectionalDerivative,                                                                                 \
-      (fmi2Component instance, const fmi2ValueReference unknowns[], size_t unknown_count,                       \
-       const fmi2ValueReference knowns[], size_t known_count, const fmi2Real seed[], fmi2Real sensitivity[]))   \
-    X(EnterEventMode, (fmi2Component instance))                                                                 \
-    X(NewDiscreteStates, (fmi2Component instance, fmi2EventInfo * info))                                        \
-    X(EnterContinuousTimeMode, (fmi2Component instance))                                                        \
-    X(CompletedIntegratorStep, (fmi2Component instance, fmi2Boolean no_set_state_before_now,                    \
-                                fmi2Boolean * enter_event_mode, fmi2Boolean * terminate))                       \
-    X(SetTime, (fmi2Component instance, fmi2Real time))                                                         \
-    X(SetContinuousStates, (fmi2Component instance, const fmi2Real states[], size_t count))                     \
-    X(GetDerivatives, (fmi2Component instance, fmi2Real derivatives[], size_t count))                           \
-    X(GetEventIndicators, (fmi2Component instance, fmi2Real indicators[], size_t count))                        \
-    X(GetContinuousStates, (fmi2Component instance, fmi2Real states[], size_t count))                           \
-    X(GetNominalsOfContinuousStates, (fmi2Component instance, fmi2Real nominals[], size_t count))               \
-    X(SetRealInputDerivatives, (fmi2Component instance, const fmi2ValueReference references[], size_t count,    \
-                                const fmi2Integer orders[], const fmi2Real values[]))                           \
-    X(GetRealOutputDerivatives, (fmi2Component instance, const fmi2ValueReference references[], size_t count,   \
-                                 const fmi2Integer orders[], fmi2Real values[]))                                \
+#define UNSUPPORTED(X)                                                                                         \
+    X(SetRealInputDerivatives, (fmi2Component instance, const fmi2ValueReference references[], size_t count,  \
+                                const fmi2Integer orders[], const fmi2Real values[]))                         \
     X(CancelStep, (fmi2Component instance))
 
 #define DEFINE_UNSUPPORTED(NAME, PARAMETERS)                              \

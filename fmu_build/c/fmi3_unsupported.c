@@ -8,8 +8,6 @@
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
 
-enum { ANY_STATE = INSTANTIATED | INITIALIZATION | STEPPING | TERMINATED };
-
 static fmi3Status unsupported(Instance *instance, const Call *call) {
     if (!instance || !instance_admits(instance, call)) return fmi3Error;
     return (fmi3Status)instance_error(instance, "belongs to a capability that this FMU does not have");
@@ -63,45 +61,25 @@ fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference referenc
     return other_type(instance, &call, count);
 }
 
-fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resource_path,
-                                          fmi3Boolean visible, fmi3Boolean logging_on,
-                                          fmi3InstanceEnvironment environment, fmi3LogMessageCallback log_message) {
-    if (log_message) log_message(environment, fmi3Error, "logStatusError", "this FMU has no model exchange");
-    return NULL;
-}
-
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String resource_path,
                                                fmi3Boolean visible, fmi3Boolean logging_on,
                                                fmi3InstanceEnvironment environment, fmi3LogMessageCallback log_message,
                                                fmi3ClockUpdateCallback clock_update,
                                                fmi3LockPreemptionCallback lock_preemption,
                                                fmi3UnlockPreemptionCallback unlock_preemption) {
-    if (log_message) log_message(environment, fmi3Error, "logStatusError", "this FMU has no scheduled execution");
+    if (log_message)
+        log_message(environment, fmi3Error, "logStatusError",
+                    "fmi3InstantiateScheduledExecution: this FMU has no scheduled execution");
     return NULL;
 }
 
 #define UNSUPPORTED(X)                                                                                             \
-    X(EnterEventMode, (fmi3Instance instance))                                                                     \
     X(GetNumberOfVariableDependencies,                                                                             \
       (fmi3Instance instance, fmi3ValueReference reference, size_t * dependency_count))                            \
     X(GetVariableDependencies,                                                                                     \
       (fmi3Instance instance, fmi3ValueReference dependent, size_t dependent_elements[],                           \
        fmi3ValueReference independents[], size_t independent_elements[], fmi3DependencyKind kinds[],               \
        size_t dependency_count))                                                                                   \
-    X(GetFMUState, (fmi3Instance instance, fmi3FMUState * state))                                                  \
-    X(SetFMUState, (fmi3Instance instance, fmi3FMUState state))                                                    \
-    X(FreeFMUState, (fmi3Instance instance, fmi3FMUState * state))                                                 \
-    X(SerializedFMUStateSize, (fmi3Instance instance, fmi3FMUState state, size_t * size))                          \
-    X(SerializeFMUState, (fmi3Instance instance, fmi3FMUState state, fmi3Byte bytes[], size_t size))               \
-    X(DeserializeFMUState, (fmi3Instance instance, const fmi3Byte bytes[], size_t size, fmi3FMUState * state))     \
-    X(GetDirectionalDerivative,                                                                                    \
-      (fmi3Instance instance, const fmi3ValueReference unknowns[], size_t unknown_count,                           \
-       const fmi3ValueReference knowns[], size_t known_count, const fmi3Float64 seed[], size_t seed_count,         \
-       fmi3Float64 sensitivity[], size_t sensitivity_count))                                                       \
-    X(GetAdjointDerivative,                                                                                        \
-      (fmi3Instance instance, const fmi3ValueReference unknowns[], size_t unknown_count,                           \
-       const fmi3ValueReference knowns[], size_t known_count, const fmi3Float64 seed[], size_t seed_count,         \
-       fmi3Float64 sensitivity[], size_t sensitivity_count))                                                       \
     X(EnterConfigurationMode, (fmi3Instance instance))                                                             \
     X(ExitConfigurationMode, (fmi3Instance instance))                                                              \
     X(GetIntervalDecimal, (fmi3Instance instance, const fmi3ValueReference references[], size_t count,             \
@@ -121,23 +99,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token
     X(SetShiftFraction, (fmi3Instance instance, const fmi3ValueReference references[], size_t count,               \
                          const fmi3UInt64 counters[], const fmi3UInt64 resolutions[]))                             \
     X(EvaluateDiscreteStates, (fmi3Instance instance))                                                             \
-    X(UpdateDiscreteStates,                                                                                        \
-      (fmi3Instance instance, fmi3Boolean * need_update, fmi3Boolean * terminate, fmi3Boolean * nominals_changed,  \
-       fmi3Boolean * values_changed, fmi3Boolean * next_event_time_defined, fmi3Float64 * next_event_time))        \
-    X(EnterContinuousTimeMode, (fmi3Instance instance))                                                            \
-    X(CompletedIntegratorStep, (fmi3Instance instance, fmi3Boolean no_set_state_before_now,                        \
-                                fmi3Boolean * enter_event_mode, fmi3Boolean * terminate))                          \
-    X(SetTime, (fmi3Instance instance, fmi3Float64 time))                                                          \
-    X(SetContinuousStates, (fmi3Instance instance, const fmi3Float64 states[], size_t count))                      \
-    X(GetContinuousStateDerivatives, (fmi3Instance instance, fmi3Float64 derivatives[], size_t count))             \
-    X(GetEventIndicators, (fmi3Instance instance, fmi3Float64 indicators[], size_t count))                         \
-    X(GetContinuousStates, (fmi3Instance instance, fmi3Float64 states[], size_t count))                            \
-    X(GetNominalsOfContinuousStates, (fmi3Instance instance, fmi3Float64 nominals[], size_t count))                \
-    X(GetNumberOfEventIndicators, (fmi3Instance instance, size_t * count))                                         \
-    X(GetNumberOfContinuousStates, (fmi3Instance instance, size_t * count))                                        \
     X(EnterStepMode, (fmi3Instance instance))                                                                      \
-    X(GetOutputDerivatives, (fmi3Instance instance, const fmi3ValueReference references[], size_t count,           \
-                             const fmi3Int32 orders[], fmi3Float64 values[], size_t value_count))                  \
     X(ActivateModelPartition, (fmi3Instance instance, fmi3ValueReference clock, fmi3Float64 time))
 
 #define DEFINE_UNSUPPORTED(NAME, PARAMETERS)                              \

@@ -1,5 +1,6 @@
 #include "instance.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -20,11 +21,12 @@ static const struct {
 
 static const size_t LOG_CATEGORY_COUNT = sizeof LOG_CATEGORIES / sizeof LOG_CATEGORIES[0];
 
-Instance *instance_new(const char *name) {
+Instance *instance_new(const char *name, bool model_exchange) {
     const size_t length = strlen(name);
     Instance *instance = calloc(1, sizeof *instance + length + 1);
     if (!instance) return NULL;
     memcpy(instance->name, name, length + 1);
+    instance->now.model_exchange = model_exchange;
     instance_reset(instance);
     return instance;
 }
@@ -34,11 +36,14 @@ void instance_free(Instance *instance) {
 }
 
 void instance_reset(Instance *instance) {
-    instance->state = INSTANTIATED;
-    instance->time = instance->stop_time = 0.0;
-    instance->stop_time_defined = false;
-    instance->composite_is_current = instance->outputs_are_current = false;
-    for (size_t i = 0; i < VARIABLE_COUNT; i++) instance->values[i] = VARIABLES[i].start;
+    const unsigned model_exchange = instance->now.model_exchange;
+    memset(&instance->now, 0, sizeof instance->now);
+    instance->now.state = INSTANTIATED;
+    instance->now.model_exchange = model_exchange;
+    instance->outputs_are_current = instance->rates_are_current = false;
+    for (size_t i = 0; i < VARIABLE_COUNT; i++) instance->now.values[i] = VARIABLES[i].start;
+    instance_start_rate(instance);
+    instance_start_attitude(instance);
 }
 
 static void write_message(Instance *instance, Status status, LogCategory category, const char *format,
@@ -58,7 +63,7 @@ Status instance_error(Instance *instance, const char *format, ...) {
     va_start(arguments, format);
     write_message(instance, STATUS_ERROR, LOG_ERROR, format, arguments);
     va_end(arguments);
-    instance->state = TERMINATED;
+    instance->now.state = TERMINATED;
     return STATUS_ERROR;
 }
 
@@ -68,7 +73,7 @@ Status instance_refuse(Instance *instance, const char *format, ...) {
     va_start(arguments, format);
     write_message(instance, status, status == STATUS_ERROR ? LOG_ERROR : LOG_DISCARD, format, arguments);
     va_end(arguments);
-    if (status == STATUS_ERROR) instance->state = TERMINATED;
+    if (status == STATUS_ERROR) instance->now.state = TERMINATED;
     return status;
 }
 
@@ -79,14 +84,28 @@ void instance_inform(Instance *instance, LogCategory category, const char *forma
     va_end(arguments);
 }
 
+static const char *state_in_words(unsigned state) {
+    switch (state) {
+        case INSTANTIATED: return "before initialisation";
+        case INITIALIZATION: return "during initialisation";
+        case STEPPING: return "between steps";
+        case INTERMEDIATE: return "within a step";
+        case EVENT: return "in event mode";
+        case CONTINUOUS: return "in continuous-time mode";
+        default: return "after termination or an error";
+    }
+}
+
 bool instance_admits(Instance *instance, const Call *call) {
     instance->call = call;
-    if (instance->state & call->states) return true;
-    const char *state = instance->state == INSTANTIATED     ? "before initialisation"
-                        : instance->state == INITIALIZATION ? "during initialisation"
-                        : instance->state == STEPPING       ? "between steps"
-                                                            : "after termination or an error";
-    instance_error(instance, "must not be called %s", state);
+    const unsigned other = instance->now.model_exchange ? ONLY_CO_SIMULATION : ONLY_MODEL_EXCHANGE;
+    const unsigned state = instance->within_step ? INTERMEDIATE : instance->now.state;
+    if ((state & call->states) && !(call->states & other)) return true;
+    if (!(state & call->states))
+        instance_error(instance, "must not be called %s", state_in_words(state));
+    else
+        instance_error(instance, "must not be called in %s",
+                       instance->now.model_exchange ? "model exchange" : "co-simulation");
     return false;
 }
 
@@ -109,28 +128,39 @@ Status instance_set_times(Instance *instance, double start_time, bool stop_time_
     if (stop_time_defined && !(stop_time >= start_time))
         return instance_error(instance, "stopTime = %.10g s: must not be before startTime = %.10g s", stop_time,
                               start_time);
-    instance->time = start_time;
-    instance->stop_time = stop_time;
-    instance->stop_time_defined = stop_time_defined;
+    instance->now.values[REFERENCE_TIME] = start_time;
+    instance->now.start_time = start_time;
+    instance->now.stop_time = stop_time;
+    instance->now.stop_time_defined = stop_time_defined;
     return STATUS_OK;
 }
 
-Status instance_start_state(Instance *instance) {
-    const double *attitude = &instance->values[REFERENCE_ATTITUDE_START];
+Status instance_start_attitude(Instance *instance) {
+    const double *attitude = &instance->now.values[REFERENCE_ATTITUDE_START];
     double largest = 0.0, square = 0.0;
     for (size_t i = 0; i < 4; i++) largest = fmax(largest, fabs(attitude[i]));
     if (largest == 0.0)
         return instance_refuse(instance, "attitude_start = (0, 0, 0, 0): must have a length greater than 0");
     for (size_t i = 0; i < 4; i++) square += (attitude[i] / largest) * (attitude[i] / largest);
-    for (size_t i = 0; i < 4; i++) instance->x[i] = attitude[i] / largest / sqrt(square);
-    memcpy(&instance->x[4], &instance->values[REFERENCE_RATE_START], 3 * sizeof(double));
+    /* what is at unit length within rounding stays as it is: nothing is gained by rounding once more */
+    const double plain = attitude[0] * attitude[0] + attitude[1] * attitude[1] + attitude[2] * attitude[2] +
+                         attitude[3] * attitude[3];
+    const bool is_unit = fabs(plain - 1.0) <= 4.0 * DBL_EPSILON;
+    double *x = instance_states(instance);
+    for (size_t i = 0; i < 4; i++) x[i] = is_unit ? attitude[i] : attitude[i] / largest / sqrt(square);
+    instance->outputs_are_current = instance->rates_are_current = false;
     return STATUS_OK;
 }
 
+void instance_start_rate(Instance *instance) {
+    memcpy(instance_states(instance) + 4, &instance->now.values[REFERENCE_RATE_START], 3 * sizeof(double));
+    instance->outputs_are_current = instance->rates_are_current = false;
+}
+
 Status instance_exit_initialization(Instance *instance) {
-    Status status = instance_start_state(instance);
+    instance_start_rate(instance);
+    Status status = instance_start_attitude(instance);
     if (status == STATUS_OK) status = composite_refresh(instance);
-    if (status == STATUS_OK) instance->state = STEPPING;
-    instance->outputs_are_current = false;
+    if (status == STATUS_OK) instance->now.state = instance->now.model_exchange ? EVENT : STEPPING;
     return status;
 }

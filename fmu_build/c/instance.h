@@ -20,7 +20,22 @@
 /* In the order of fmi2Status and fmi3Status. */
 typedef enum { STATUS_OK, STATUS_WARNING, STATUS_DISCARD, STATUS_ERROR, STATUS_FATAL } Status;
 
-typedef enum { INSTANTIATED = 1, INITIALIZATION = 2, STEPPING = 4, TERMINATED = 8 } State;
+/* Where in its life cycle an instance is, as bits: a call is allowed in some of them, and in one interface if it says
+   so. */
+typedef enum {
+    INSTANTIATED = 1,
+    INITIALIZATION = 2,
+    STEPPING = 4,        /* co-simulation, between steps */
+    INTERMEDIATE = 8,    /* co-simulation, in the importer's callback within a step */
+    EVENT = 16,          /* model exchange */
+    CONTINUOUS = 32,     /* model exchange */
+    TERMINATED = 64,
+    BEFORE_START = INSTANTIATED | INITIALIZATION,
+    RUNNING = STEPPING | EVENT | CONTINUOUS,
+    ANY_STATE = 127,
+    ONLY_CO_SIMULATION = 128,
+    ONLY_MODEL_EXCHANGE = 256
+} State;
 
 /* Log categories, as bits. */
 typedef enum { LOG_DISCARD = 1, LOG_ERROR = 2, LOG_COMPOSITE = 4, LOG_ALL = 7 } LogCategory;
@@ -37,33 +52,54 @@ typedef struct Instance Instance;
 /* Hands a message on to the importer in its version of FMI. */
 typedef void (*LogWriter)(const Instance *instance, Status status, const char *category, const char *message);
 
-struct Instance {
-    State state;
-    const Call *call;                 /* the FMI function being answered */
-    LogWriter write_log;
-    void *environment;                /* the importer's, handed back with each message */
-    void (*log_callback)(void);       /* the importer's, of the type that write_log knows */
-    unsigned log_categories;
+/* Tells the importer that a sub-step ended, in its version of FMI. Returns whether it wants the step to end
+   early, at *end [s] or as soon as possible after it. */
+typedef bool (*SubStepListener)(Instance *instance, double *end);
 
-    double time;                      /* s */
+/* All that a saved state holds. The doubles come first: there is no padding. */
+typedef struct {
+    double values[VARIABLE_COUNT];    /* by value reference: time, inputs, parameters, outputs, states, rates */
+    double start_time;                /* s */
     double stop_time;                 /* s, meaningful if stop_time_defined */
-    bool stop_time_defined;
-
-    bool composite_is_current;        /* c follows from the inputs as they are */
-    bool outputs_are_current;         /* values of outputs follow from x, the inputs and c */
-    double values[VARIABLE_COUNT];    /* by value reference */
     double p[INPUT_P_COUNT + 1];      /* the composite's inputs, directions scaled; + 1: may be none */
-    double c[COMPOSITE_COUNT];
-    double x[STATE_COUNT];            /* attitude w, x, y, z; angular velocity, rad/s */
+    double c[COMPOSITE_COUNT];        /* the composite of p */
+    unsigned state;                   /* a State */
+    unsigned model_exchange;          /* else co-simulation */
+    unsigned stop_time_defined;
+    unsigned composite_is_current;    /* p and c follow from the inputs as they are */
+} Dynamics;
+
+/* Small changes of, or weights on, what the model's functions take and give. */
+typedef struct {
+    double inputs[INPUT_P_COUNT + INPUT_U_COUNT + 1];   /* p, then u; + 1: there may be none */
+    double x[STATE_COUNT], c[COMPOSITE_COUNT];
+    double rate[STATE_COUNT], y[OUTPUT_COUNT + 1];
+} Variation;
+
+struct Instance {
+    Dynamics now;
+    bool outputs_are_current;         /* the outputs in now.values follow from states, inputs and now.c */
+    bool rates_are_current;           /* so do the rates */
+    Variation variation;
     const double *arg[WORK_ARG];
     double *res[WORK_RES];
     int iw[WORK_INT];
     double w[WORK_REAL];
+
+    const Call *call;                 /* the FMI function being answered */
+    void *environment;                /* the importer's, handed back with each callback */
+    LogWriter write_log;
+    void (*log_callback)(void);       /* the importer's, of the type that write_log knows */
+    SubStepListener sub_step_ended;   /* NULL: nobody listens */
+    void (*sub_step_callback)(void);  /* the importer's, of the type that sub_step_ended knows */
+    bool early_return_allowed;
+    bool within_step;                 /* in the importer's callback: most calls have to wait */
+    unsigned log_categories;
     char name[];                      /* the importer's name of the instance */
 };
 
 /* Returns a new instance in state INSTANTIATED with the scene's start values, or NULL if there is no memory. */
-Instance *instance_new(const char *name);
+Instance *instance_new(const char *name, bool model_exchange);
 void instance_free(Instance *instance);
 
 /* Back to what instance_new made; the log settings stay. */
@@ -85,23 +121,74 @@ void instance_inform(Instance *instance, LogCategory category, const char *forma
 /* Turns categories on by name (count 0: all of them) or, with on == false, everything off. */
 Status instance_set_logging(Instance *instance, bool on, size_t count, const char *const names[]);
 
+/* Where states (attitude w, x, y, z; angular velocity, rad/s) and their rates stand among the values. */
+static inline double *instance_states(Instance *instance) {
+    return &instance->now.values[REFERENCE_STATES];
+}
+static inline double *instance_rates(Instance *instance) {
+    return &instance->now.values[REFERENCE_DERIVATIVES];
+}
+
+/* Points the first arguments of the model's functions to x, u, c. */
+static inline void instance_set_arguments(Instance *instance) {
+    instance->arg[0] = instance_states(instance);
+    instance->arg[1] = &instance->now.values[REFERENCE_TORQUE];
+    instance->arg[2] = instance->now.c;
+}
+
 /* Sets the time to start at and, if defined, the time not to be passed [s]. */
 Status instance_set_times(Instance *instance, double start_time, bool stop_time_defined, double stop_time);
 
-/* Judges what was set, fixes the state at the start and goes on to STEPPING. */
+/* Judges what was set, fixes the state at the start and goes on to STEPPING or EVENT. */
 Status instance_exit_initialization(Instance *instance);
 
-/* Gets or sets values by value reference: all of them or none. */
+/* Takes the states at the start from the parameters, the attitude at length 1. */
+Status instance_start_attitude(Instance *instance);
+void instance_start_rate(Instance *instance);
+
+/* variables.c: gets or sets values by value reference, all of them or none. */
 Status instance_get(Instance *instance, const unsigned references[], size_t count, double values[]);
 Status instance_set(Instance *instance, const unsigned references[], size_t count, const double values[]);
+Status instance_check_references(Instance *instance, const unsigned references[], size_t count);
 
-/* Takes the state at the start from the parameters, the attitude at length 1. */
-Status instance_start_state(Instance *instance);
+/* Whether the state has an attitude that can be brought to unit length; a solver may have lost it. */
+Status instance_check_attitude(Instance *instance);
 
-/* Makes c follow from the inputs, unless it does: judges them and computes the composite. */
+/* continuous states of model exchange, in the order of the table */
+Status instance_set_time(Instance *instance, double time);
+Status instance_get_states(Instance *instance, double states[], size_t count);
+Status instance_set_states(Instance *instance, const double states[], size_t count);
+Status instance_get_rates(Instance *instance, double rates[], size_t count);
+Status instance_get_nominals(Instance *instance, double nominals[], size_t count);
+
+/* composite.c: makes c follow from the inputs, unless it does: judges them and computes the composite. */
 Status composite_refresh(Instance *instance);
 
-/* Advances the state by one communication step of size h [s] from time [s]. */
-Status solver_step(Instance *instance, double time, double h);
+/* Multiplies a change of p, or weights on p as scaled, by the powers of two that the directions were scaled by. */
+void composite_scale_variation(const Instance *instance, double p[]);
+
+/* solver.c: advances the state from time [s] by one communication step of size h [s], or to where the importer
+   wants it to end early. */
+Status solver_step(Instance *instance, double time, double h, bool *ended_early);
+
+/* derivatives.c: partial derivatives of outputs and rates by inputs and states, at what the outputs are now;
+   in INITIALIZATION of outputs, states and rates by inputs and parameters. Forward: sensitivity of unknowns to a
+   change (seed) of knowns. Adjoint: of the seed-weighted sum of unknowns to each known. */
+Status derivatives_forward(Instance *instance, const unsigned unknowns[], size_t unknown_count,
+                           const unsigned knowns[], size_t known_count, const double seed[], double sensitivity[]);
+Status derivatives_adjoint(Instance *instance, const unsigned unknowns[], size_t unknown_count,
+                           const unsigned knowns[], size_t known_count, const double seed[], double sensitivity[]);
+
+/* Derivatives of outputs with respect to time, inputs held; orders must be 1. */
+Status derivatives_of_time(Instance *instance, const unsigned references[], size_t count, const int orders[],
+                           double values[]);
+
+/* saved_state.c: copies of Dynamics, owned by the importer between save and free. */
+Status saved_state_save(Instance *instance, void **saved);
+Status saved_state_restore(Instance *instance, const void *saved);
+Status saved_state_free(Instance *instance, void **saved);
+Status saved_state_size(Instance *instance, const void *saved, size_t *size);
+Status saved_state_serialize(Instance *instance, const void *saved, unsigned char bytes[], size_t size);
+Status saved_state_deserialize(Instance *instance, const unsigned char bytes[], size_t size, void **saved);
 
 #endif

@@ -4,87 +4,191 @@
 #include "instance.h"
 #include "model.h"
 
-/* Whether all references can be used as the call asks; logs the first that cannot. */
-static Status check_references(Instance *instance, const unsigned references[], size_t count, const void *values) {
+/* Squares of the attitude's length beyond which it cannot be brought to unit length. */
+static const double SMALLEST_SQUARE = 1e-200;
+static const double LARGEST_SQUARE = 1e200;
+
+static Status unknown_reference(Instance *instance, unsigned reference) {
+    return instance_error(instance, "value reference %u is unknown; the largest is %d", reference, VARIABLE_COUNT - 1);
+}
+
+Status instance_check_references(Instance *instance, const unsigned references[], size_t count) {
     if (count == 0) return STATUS_OK;
-    if (!references) return instance_error(instance, "valueReferences is NULL");
-    if (!values) return instance_error(instance, "values is NULL");
+    if (!references) return instance_error(instance, "the array of value references is NULL");
     for (size_t i = 0; i < count; i++)
-        if (references[i] >= VARIABLE_COUNT)
-            return instance_error(instance, "value reference %u is unknown; the largest is %d", references[i],
-                                  VARIABLE_COUNT - 1);
+        if (references[i] >= VARIABLE_COUNT) return unknown_reference(instance, references[i]);
+    return STATUS_OK;
+}
+
+Status instance_check_attitude(Instance *instance) {
+    const double *q = instance_states(instance);
+    const double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+    if (!(square >= SMALLEST_SQUARE && square <= LARGEST_SQUARE))
+        return instance_refuse(instance, "state.attitude = (%.10g, %.10g, %.10g, %.10g): its length must be about 1",
+                               q[0], q[1], q[2], q[3]);
     return STATUS_OK;
 }
 
 static Status refresh_outputs(Instance *instance) {
     if (instance->outputs_are_current) return STATUS_OK;
-    instance->arg[0] = instance->x;
-    instance->arg[1] = &instance->values[REFERENCE_TORQUE];
-    instance->arg[2] = instance->c;
-    instance->res[0] = &instance->values[REFERENCE_OUTPUTS];
+    const Status status = instance_check_attitude(instance);
+    if (status != STATUS_OK) return status;
+    instance_set_arguments(instance);
+    instance->res[0] = &instance->now.values[REFERENCE_OUTPUTS];
     outputs(instance->arg, instance->res, instance->iw, instance->w, 0);
     instance->outputs_are_current = true;
     return STATUS_OK;
 }
 
-/* Makes the outputs that are asked for follow from state and inputs. A composite that cannot be computed
-   spoils only what depends on it. */
-static Status prepare_outputs(Instance *instance, const unsigned references[], size_t count) {
-    bool wanted = false, shaped = false;
-    for (size_t i = 0; i < count; i++) {
-        wanted = wanted || VARIABLES[references[i]].causality == CAUSALITY_OUTPUT;
-        shaped = shaped || (VARIABLES[references[i]].causality == CAUSALITY_OUTPUT &&
-                            VARIABLES[references[i]].shapes_composite);
+static Status refresh_rates(Instance *instance) {
+    if (instance->rates_are_current) return STATUS_OK;
+    instance_set_arguments(instance);
+    instance->res[0] = instance_rates(instance);
+    ode(instance->arg, instance->res, instance->iw, instance->w, 0);
+    instance->rates_are_current = true;
+    return STATUS_OK;
+}
+
+/* Makes what is asked for follow from state and inputs. A composite that cannot be computed spoils only what
+   follows from it. */
+static Status prepare(Instance *instance, unsigned wanted) {
+    Status status = STATUS_OK;
+    if (instance->now.state & BEFORE_START) {
+        if (wanted & FOLLOWS_STATES) instance_start_rate(instance);
+        if (wanted & FOLLOWS_ATTITUDE) status = instance_start_attitude(instance);
     }
-    if (!wanted) return STATUS_OK;
-    if (instance->state & (INSTANTIATED | INITIALIZATION)) {
-        instance->outputs_are_current = false;
-        const Status status = instance_start_state(instance);
-        if (status != STATUS_OK) return status;
-    }
-    if (shaped) {
-        const Status status = composite_refresh(instance);
-        if (status != STATUS_OK) return status;
-    }
-    return refresh_outputs(instance);
+    if (status == STATUS_OK && (wanted & FOLLOWS_COMPOSITE)) status = composite_refresh(instance);
+    if (status == STATUS_OK && (wanted & FOLLOWS_OUTPUTS)) status = refresh_outputs(instance);
+    if (status == STATUS_OK && (wanted & FOLLOWS_RATES)) status = refresh_rates(instance);
+    return status;
+}
+
+static Status beyond_range(Instance *instance, size_t reference) {
+    return instance_refuse(instance, "%s leaves the range of finite numbers", VARIABLES[reference].name);
 }
 
 Status instance_get(Instance *instance, const unsigned references[], size_t count, double values[]) {
-    Status status = check_references(instance, references, count, values);
-    if (status == STATUS_OK) status = prepare_outputs(instance, references, count);
+    if (count == 0) return STATUS_OK;
+    if (!references || !values) return instance_error(instance, "an array is NULL");
+    unsigned wanted = 0;
+    for (size_t i = 0; i < count; i++) {
+        if (references[i] >= VARIABLE_COUNT) return unknown_reference(instance, references[i]);
+        wanted |= VARIABLES[references[i]].follows;
+    }
+    const Status status = prepare(instance, wanted);
     if (status != STATUS_OK) return status;
-    for (size_t i = 0; i < count; i++)
-        values[i] = VARIABLES[references[i]].causality == CAUSALITY_INDEPENDENT ? instance->time
-                                                                               : instance->values[references[i]];
+    for (size_t i = 0; i < count; i++) {
+        values[i] = instance->now.values[references[i]];
+        if (!isfinite(values[i])) return beyond_range(instance, references[i]);
+    }
     return STATUS_OK;
 }
 
 static Status check_settable(Instance *instance, const Variable *variable) {
-    if (variable->causality == CAUSALITY_INPUT) return STATUS_OK;
-    if (variable->causality == CAUSALITY_PARAMETER) {
-        if (instance->state & (INSTANTIATED | INITIALIZATION)) return STATUS_OK;
-        return instance_error(instance, "%s is a fixed parameter and cannot be set after initialisation",
-                              variable->name);
+    switch (variable->role) {
+        case ROLE_INPUT: return STATUS_OK;
+        case ROLE_PARAMETER:
+            if (instance->now.state & BEFORE_START) return STATUS_OK;
+            return instance_error(instance, "%s is a fixed parameter and cannot be set after initialisation",
+                                  variable->name);
+        case ROLE_OUTPUT: return instance_error(instance, "%s is an output and cannot be set", variable->name);
+        case ROLE_STATE: /* beside SetContinuousStates: CasADi's importer sets states by reference */
+            if (instance->now.state & (EVENT | CONTINUOUS)) return STATUS_OK;
+            return instance_error(instance, "%s is a state: it can be set in model exchange once it runs",
+                                  variable->name);
+        case ROLE_DERIVATIVE:
+            return instance_error(instance, "%s is a local variable and cannot be set", variable->name);
+        default: return instance_error(instance, "%s is the independent variable and cannot be set", variable->name);
     }
-    return instance_error(instance, "%s is %s and cannot be set", variable->name,
-                          variable->causality == CAUSALITY_OUTPUT ? "an output" : "the independent variable");
+}
+
+static Status refuse_not_finite(Instance *instance, const Variable *variable, double value) {
+    return instance_refuse(instance, "%s = %.10g%s%s: must be finite", variable->name, value,
+                           variable->unit[0] ? " " : "", variable->unit);
+}
+
+/* Inputs stand together: those of the composite, then the torque. */
+static bool is_input(unsigned reference) {
+    return reference >= REFERENCE_P && reference < REFERENCE_P + INPUT_P_COUNT + INPUT_U_COUNT;
+}
+
+/* Whether a value may be stored: known, settable in this state, finite. */
+static Status check_set(Instance *instance, unsigned reference, double value) {
+    if (reference >= VARIABLE_COUNT) return unknown_reference(instance, reference);
+    const Variable *variable = &VARIABLES[reference];
+    if (variable->role != ROLE_INPUT) {
+        const Status status = check_settable(instance, variable);
+        if (status != STATUS_OK) return status;
+    }
+    if (isfinite(value)) return STATUS_OK;
+    return refuse_not_finite(instance, variable, value);
 }
 
 Status instance_set(Instance *instance, const unsigned references[], size_t count, const double values[]) {
-    Status status = check_references(instance, references, count, values);
-    for (size_t i = 0; i < count && status == STATUS_OK; i++)
-        status = check_settable(instance, &VARIABLES[references[i]]);
-    for (size_t i = 0; i < count && status == STATUS_OK; i++)
-        if (!isfinite(values[i]))
-            status = instance_refuse(instance, "%s = %.10g %s: must be finite", VARIABLES[references[i]].name,
-                                     values[i], VARIABLES[references[i]].unit);
-    if (status != STATUS_OK) return status;
+    if (count == 0) return STATUS_OK;
+    if (!references || !values) return instance_error(instance, "an array is NULL");
     for (size_t i = 0; i < count; i++) {
-        double *value = &instance->values[references[i]];
+        if (is_input(references[i]) && isfinite(values[i])) continue;
+        const Status status = check_set(instance, references[i], values[i]);
+        if (status != STATUS_OK) return status;
+    }
+    bool changed = false, shape_changed = false;
+    for (size_t i = 0; i < count; i++) {
+        double *value = &instance->now.values[references[i]];
         if (*value == values[i]) continue;
         *value = values[i];
-        instance->outputs_are_current = false;
-        if (VARIABLES[references[i]].shapes_composite) instance->composite_is_current = false;
+        changed = true;
+        shape_changed = shape_changed || references[i] < REFERENCE_TORQUE;
     }
+    if (changed) instance->outputs_are_current = instance->rates_are_current = false;
+    if (shape_changed) instance->now.composite_is_current = false;
     return STATUS_OK;
+}
+
+Status instance_set_time(Instance *instance, double time) {
+    if (!isfinite(time)) return instance_refuse(instance, "time = %.10g s: must be finite", time);
+    instance->now.values[REFERENCE_TIME] = time;
+    return STATUS_OK;
+}
+
+static Status check_states(Instance *instance, const void *array, size_t count) {
+    if (!array) return instance_error(instance, "the array is NULL");
+    if (count != STATE_COUNT)
+        return instance_error(instance, "the array has %zu elements: must be %d", count, STATE_COUNT);
+    return STATUS_OK;
+}
+
+Status instance_get_states(Instance *instance, double states[], size_t count) {
+    Status status = check_states(instance, states, count);
+    if (status == STATUS_OK) status = prepare(instance, FOLLOWS_STATES | FOLLOWS_ATTITUDE);
+    if (status == STATUS_OK) memcpy(states, instance_states(instance), STATE_COUNT * sizeof(double));
+    return status;
+}
+
+Status instance_set_states(Instance *instance, const double states[], size_t count) {
+    const Status status = check_states(instance, states, count);
+    if (status != STATUS_OK) return status;
+    for (size_t i = 0; i < STATE_COUNT; i++)
+        if (!isfinite(states[i]))
+            return refuse_not_finite(instance, &VARIABLES[REFERENCE_STATES + i], states[i]);
+    memcpy(instance_states(instance), states, STATE_COUNT * sizeof(double));
+    instance->outputs_are_current = instance->rates_are_current = false;
+    return STATUS_OK;
+}
+
+Status instance_get_rates(Instance *instance, double rates[], size_t count) {
+    Status status = check_states(instance, rates, count);
+    if (status == STATUS_OK) status = prepare(instance, FOLLOWS_STATES | FOLLOWS_ATTITUDE | FOLLOWS_COMPOSITE | FOLLOWS_RATES);
+    for (size_t i = 0; i < STATE_COUNT && status == STATUS_OK; i++) {
+        rates[i] = instance_rates(instance)[i];
+        if (!isfinite(rates[i])) status = beyond_range(instance, REFERENCE_DERIVATIVES + i);
+    }
+    return status;
+}
+
+Status instance_get_nominals(Instance *instance, double nominals[], size_t count) {
+    const Status status = check_states(instance, nominals, count);
+    for (size_t i = 0; i < STATE_COUNT && status == STATUS_OK; i++)
+        nominals[i] = VARIABLES[REFERENCE_STATES + i].nominal;
+    return status;
 }

@@ -2,17 +2,11 @@
 #ifndef VARIABLES_H
 #define VARIABLES_H
 
-#include <stdbool.h>
 #include <stddef.h>
 
 #include "scene.h"
 
-typedef enum {
-    CAUSALITY_INDEPENDENT,
-    CAUSALITY_INPUT,
-    CAUSALITY_PARAMETER,
-    CAUSALITY_OUTPUT
-} Causality;
+typedef enum { ROLE_TIME, ROLE_INPUT, ROLE_PARAMETER, ROLE_OUTPUT, ROLE_STATE, ROLE_DERIVATIVE } Role;
 
 /* What a value must be beside finite. A check stands at the first element of what is judged together. */
 typedef enum {
@@ -22,16 +16,26 @@ typedef enum {
     CHECK_PORT    /* direction[3] and alignment[3]: lengths > 0, not parallel */
 } Check;
 
+/* What must be current before a variable is read, as bits. */
+enum {
+    FOLLOWS_COMPOSITE = 1,
+    FOLLOWS_STATES = 2,
+    FOLLOWS_ATTITUDE = 4, /* the attitude among the states */
+    FOLLOWS_OUTPUTS = 8,
+    FOLLOWS_RATES = 16
+};
+
 typedef struct {
     const char *name;
     const char *unit;
     double start;
-    Causality causality;
+    double nominal;
+    Role role;
     Check check;
-    bool shapes_composite;   /* an input that the composite depends on, or an output that follows from it */
+    unsigned follows;
 } Variable;
 
-/* Indexed by value reference. */
+/* Indexed by value reference: time, inputs (p, then torque), parameters, outputs, states, derivatives. */
 extern const Variable VARIABLES[VARIABLE_COUNT];
 
 extern const char MODEL_TOKEN[];

@@ -1,0 +1,163 @@
+#include <math.h>
+#include <string.h>
+
+#include "instance.h"
+#include "model.h"
+
+/* What a reference may stand for in a set of knowns or unknowns, as bits of (1 << role). */
+static unsigned allowed_knowns(const Instance *instance) {
+    const unsigned at_start = 1u << ROLE_PARAMETER, later = 1u << ROLE_STATE;
+    return (1u << ROLE_TIME) | (1u << ROLE_INPUT) | (instance->now.state & BEFORE_START ? at_start : later);
+}
+
+static unsigned allowed_unknowns(const Instance *instance) {
+    const unsigned at_start = 1u << ROLE_STATE;
+    return (1u << ROLE_OUTPUT) | (1u << ROLE_DERIVATIVE) | (instance->now.state & BEFORE_START ? at_start : 0u);
+}
+
+static Status check_roles(Instance *instance, const unsigned references[], size_t count, unsigned allowed,
+                          const char *what) {
+    const Status status = instance_check_references(instance, references, count);
+    if (status != STATUS_OK) return status;
+    for (size_t i = 0; i < count; i++)
+        if (!(allowed & (1u << VARIABLES[references[i]].role)))
+            return instance_error(instance, "%s cannot be %s of a derivative here", VARIABLES[references[i]].name,
+                                  what);
+    return STATUS_OK;
+}
+
+/* Checks a request and makes state and composite current. */
+static Status prepare(Instance *instance, const unsigned unknowns[], size_t unknown_count, const unsigned knowns[],
+                      size_t known_count, const double seed[], const double sensitivity[], size_t seed_count,
+                      size_t sensitivity_count) {
+    Status status = check_roles(instance, unknowns, unknown_count, allowed_unknowns(instance), "an unknown");
+    if (status == STATUS_OK)
+        status = check_roles(instance, knowns, known_count, allowed_knowns(instance), "a known");
+    if (status == STATUS_OK && ((seed_count > 0 && !seed) || (sensitivity_count > 0 && !sensitivity)))
+        status = instance_error(instance, "the array of seeds or of sensitivities is NULL");
+    for (size_t i = 0; i < seed_count && status == STATUS_OK; i++)
+        if (!isfinite(seed[i]))
+            status = instance_refuse(instance, "seed %zu = %.10g: must be finite", i + 1, seed[i]);
+    if (status == STATUS_OK && (instance->now.state & BEFORE_START)) {
+        instance_start_rate(instance);
+        status = instance_start_attitude(instance);
+    }
+    if (status == STATUS_OK) status = instance_check_attitude(instance);
+    return status == STATUS_OK ? composite_refresh(instance) : status;
+}
+
+/* Applies the derivative of q = s/|s| to a vector in place; it is symmetric, so it serves both ways. */
+static void project_attitude_start(Instance *instance, double v[4]) {
+    const double *q = instance_states(instance), *s = &instance->now.values[REFERENCE_ATTITUDE_START];
+    const double length = fabs(s[0] * q[0] + s[1] * q[1] + s[2] * q[2] + s[3] * q[3]);
+    const double along = q[0] * v[0] + q[1] * v[1] + q[2] * v[2] + q[3] * v[3];
+    for (size_t i = 0; i < 4; i++) v[i] = (v[i] - q[i] * along) / length;
+}
+
+/* Where the variation of a variable stands, or NULL: time changes nothing. Start parameters vary the state that
+   they become, the angular velocity's three before the attitude's four. */
+static double *place(Variation *v, unsigned reference) {
+    switch (VARIABLES[reference].role) {
+        case ROLE_INPUT:
+            return &v->inputs[reference - REFERENCE_P];
+        case ROLE_PARAMETER:
+            return reference < REFERENCE_ATTITUDE_START ? &v->x[4 + reference - REFERENCE_RATE_START]
+                                                        : &v->x[reference - REFERENCE_ATTITUDE_START];
+        case ROLE_STATE: return &v->x[reference - REFERENCE_STATES];
+        case ROLE_DERIVATIVE: return &v->rate[reference - REFERENCE_DERIVATIVES];
+        case ROLE_OUTPUT: return &v->y[reference - REFERENCE_OUTPUTS];
+        default: return NULL;
+    }
+}
+
+/* From changes of x, u, c to changes of rate and y. */
+static void respond(Instance *instance) {
+    Variation *v = &instance->variation;
+    instance_set_arguments(instance);
+    instance->arg[3] = v->x;
+    instance->arg[4] = v->inputs + INPUT_P_COUNT;
+    instance->arg[5] = v->c;
+    instance->res[0] = v->rate;
+    instance->res[1] = v->y;
+    response_forward(instance->arg, instance->res, instance->iw, instance->w, 0);
+}
+
+Status derivatives_forward(Instance *instance, const unsigned unknowns[], size_t unknown_count,
+                           const unsigned knowns[], size_t known_count, const double seed[], double sensitivity[]) {
+    const Status status = prepare(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity,
+                                  known_count, unknown_count);
+    if (status != STATUS_OK) return status;
+    Variation *v = &instance->variation;
+    memset(v, 0, sizeof *v);
+    bool shape_changes = false;
+    for (size_t i = 0; i < known_count; i++) {
+        double *change = place(v, knowns[i]);
+        if (change) *change += seed[i];
+        shape_changes = shape_changes || (knowns[i] < REFERENCE_TORQUE && seed[i] != 0.0);
+    }
+    if (instance->now.state & BEFORE_START) project_attitude_start(instance, v->x);
+    if (shape_changes) {
+        composite_scale_variation(instance, v->inputs);
+        instance->arg[0] = instance->now.p;
+        instance->arg[1] = v->inputs;
+        instance->res[0] = v->c;
+        composite_forward(instance->arg, instance->res, instance->iw, instance->w, 0);
+    }
+    respond(instance);
+    for (size_t i = 0; i < unknown_count; i++) sensitivity[i] = *place(v, unknowns[i]);
+    return STATUS_OK;
+}
+
+Status derivatives_adjoint(Instance *instance, const unsigned unknowns[], size_t unknown_count,
+                           const unsigned knowns[], size_t known_count, const double seed[], double sensitivity[]) {
+    const Status status = prepare(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity,
+                                  unknown_count, known_count);
+    if (status != STATUS_OK) return status;
+    Variation *v = &instance->variation;
+    double on_states[STATE_COUNT];
+    memset(v, 0, sizeof *v);
+    for (size_t i = 0; i < unknown_count; i++) *place(v, unknowns[i]) += seed[i];
+    memcpy(on_states, v->x, sizeof on_states);
+    instance_set_arguments(instance);
+    instance->arg[3] = v->rate;
+    instance->arg[4] = v->y;
+    instance->res[0] = v->x;
+    instance->res[1] = v->inputs + INPUT_P_COUNT;
+    instance->res[2] = v->c;
+    response_reverse(instance->arg, instance->res, instance->iw, instance->w, 0);
+    instance->arg[0] = instance->now.p;
+    instance->arg[1] = v->c;
+    instance->res[0] = v->inputs;
+    composite_reverse(instance->arg, instance->res, instance->iw, instance->w, 0);
+    composite_scale_variation(instance, v->inputs);
+    if (instance->now.state & BEFORE_START) {
+        for (size_t i = 0; i < STATE_COUNT; i++) v->x[i] += on_states[i];
+        project_attitude_start(instance, v->x);
+    }
+    for (size_t i = 0; i < known_count; i++) {
+        const double *weight = place(v, knowns[i]);
+        sensitivity[i] = weight ? *weight : 0.0;
+    }
+    return STATUS_OK;
+}
+
+Status derivatives_of_time(Instance *instance, const unsigned references[], size_t count, const int orders[],
+                           double values[]) {
+    Status status = check_roles(instance, references, count, 1u << ROLE_OUTPUT, "differentiated: only outputs");
+    if (status == STATUS_OK && count > 0 && (!orders || !values))
+        status = instance_error(instance, "the array of orders or of values is NULL");
+    for (size_t i = 0; i < count && status == STATUS_OK; i++)
+        if (orders[i] != 1)
+            status = instance_error(instance, "order %d of %s: only the first derivative is known", orders[i],
+                                    VARIABLES[references[i]].name);
+    Variation *v = &instance->variation;
+    if (status == STATUS_OK) {
+        memset(v, 0, sizeof *v);
+        status = instance_get_rates(instance, v->x, STATE_COUNT);
+    }
+    if (status != STATUS_OK) return status;
+    memset(v->c, 0, sizeof v->c);
+    respond(instance);
+    for (size_t i = 0; i < count; i++) values[i] = v->y[references[i] - REFERENCE_OUTPUTS];
+    return STATUS_OK;
+}
