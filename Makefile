@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: run test check clean
+.PHONY: run test check platforms robustness bench clean
 
 run: .venv/installed
 	$(BIN)/python -m fmu_build examples/iss_dg.toml -o build/iss_dg.fmu
@@ -15,6 +15,15 @@ check: .venv/installed-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+
+platforms: .venv/installed-dev
+	$(BIN)/python -m pytest -m platforms tests/platforms
+
+robustness: .venv/installed-dev
+	$(BIN)/python -m pytest -m robustness tests/robustness
+
+bench: .venv/installed
+	$(BIN)/python tests/bench/run.py
 
 clean:
 	rm -rf .venv build .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,10 +1,12 @@
 """Ten minutes of the ISS with a DeltaGlider docked: the ship burns fuel, its port is moved, torque acts.
 
-Run by `make run`: flies build/iss_dg.fmu with FMPy, once under the tensor law and once, in a second FMU
-built from the same scene, under the diagonal-only law. Writes build/iss_dg.csv (every output at every
-step), build/iss_dg_inertia.png, build/iss_dg_rotation.png and build/iss_dg.md; prints the table.
+Run by `make run`, or with a folder as argument (default: build). Flies iss_dg.fmu in that folder with FMPy,
+once under the tensor law and once, in a second FMU built from the same scene, under the diagonal-only law.
+Writes iss_dg.csv (every output at every step), iss_dg_inertia.png, iss_dg_rotation.png and iss_dg.md there;
+prints the table.
 """
 
+import sys
 import tomllib
 from pathlib import Path
 
@@ -19,7 +21,6 @@ from fmu_build import build_fmu
 from supervessel import parse_scene
 
 EXAMPLES = Path(__file__).parent
-BUILD = EXAMPLES.parent / "build"
 DURATION, STEP = 600.0, 0.1  # s
 
 
@@ -119,17 +120,17 @@ def plot(panels: list[tuple[str, np.ndarray, list[str]]], t: np.ndarray, file: P
     plt.close(figure)
 
 
-def main() -> None:
-    """Flies both FMUs, writes the files, prints the table."""
+def main(folder: Path) -> None:
+    """Flies both FMUs, writes the files into `folder`, prints the table."""
     raw = tomllib.loads((EXAMPLES / "iss_dg.toml").read_text())
     raw["rotation"]["law"] = "principal"
-    diagonal = build_fmu(parse_scene(raw, "iss_dg.toml"), BUILD / "iss_dg_principal.fmu")
-    tensor_law, principal_law = fly(BUILD / "iss_dg.fmu"), fly(diagonal)
+    diagonal = build_fmu(parse_scene(raw, "iss_dg.toml"), folder / "iss_dg_principal.fmu")
+    tensor_law, principal_law = fly(folder / "iss_dg.fmu"), fly(diagonal)
     apart = turned_apart(group(tensor_law, "attitude", 4), group(principal_law, "attitude", 4))
 
     names = tensor_law.dtype.names
     np.savetxt(
-        BUILD / "iss_dg.csv",
+        folder / "iss_dg.csv",
         np.column_stack([tensor_law[name] for name in names]),
         delimiter=",",
         header=",".join(f'"{name}"' for name in names),
@@ -145,7 +146,7 @@ def main() -> None:
             ("mass [t]", tensor_law["mass"][:, None] / 1000.0, ["ISS + DG"]),
         ],
         t,
-        BUILD / "iss_dg_inertia.png",
+        folder / "iss_dg_inertia.png",
     )
     plot(
         [
@@ -154,10 +155,10 @@ def main() -> None:
             ("law principal off [deg]", apart[:, None], ["against tensor"]),
         ],
         t,
-        BUILD / "iss_dg_rotation.png",
+        folder / "iss_dg_rotation.png",
     )
     results = table(tensor_law, apart)
-    (BUILD / "iss_dg.md").write_text(
+    (folder / "iss_dg.md").write_text(
         "# ISS with a DeltaGlider, ten minutes\n\n"
         "Fuel burns from 60 to 360 s, the docking port of the ship is moved from 400 to 460 s, torque\n"
         "pulses act about x (30-50, 200-220 s) and z (100-120, 500-520 s). Law `tensor`; the last column is\n"
@@ -170,4 +171,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else EXAMPLES.parent / "build")

@@ -1,12 +1,14 @@
-"""Command line: python -m fmu_build SCENE.toml [-o OUT.fmu] [--fmi 2|3]."""
+"""Command line: python -m fmu_build SCENE.toml [-o OUT.fmu] [--fmi 2|3] [--platform NAME ...|all]."""
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from fmu_build.build import build_fmu
 from fmu_build.errors import BuildError
+from fmu_build.platforms import PLATFORMS, platforms_named
 from supervessel import SceneError, load_scene
 
 
@@ -20,12 +22,41 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "-o", "--output", type=Path, metavar="OUT.fmu", help="the FMU to write (default: NAME.fmu here)"
     )
     parser.add_argument("--fmi", type=int, choices=(2, 3), default=3, help="FMI version (default: 3)")
+    parser.add_argument(
+        "--platform",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME",
+        help=f"to compile for (default: this machine's): {', '.join(p.name for p in PLATFORMS)}; or all",
+    )
     options = parser.parse_args(arguments)
     try:
+        platforms = platforms_named(options.platform)
+    except ValueError as error:
+        parser.error(f"--platform: {error}")
+    try:
         scene = load_scene(options.scene)
-        print(build_fmu(scene, options.output or Path(f"{scene.name}.fmu"), options.fmi))
+        output = options.output or Path(f"{scene.name}.fmu")
+        if output.exists() and output.samefile(options.scene):
+            raise BuildError(f"{output}: is the scene file itself; the FMU needs a name of its own")
+        build_fmu(scene, output, options.fmi, platforms)
     except (SceneError, BuildError) as error:
         print(error, file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("interrupted; no FMU was written", file=sys.stderr)
+        return 1
+    return _print_path(output)
+
+
+def _print_path(output: Path) -> int:
+    """Prints the path of the FMU; returns 0, or 1 where standard output does not take it."""
+    try:
+        print(output, flush=True)
+    except (OSError, UnicodeError) as error:
+        print(f"the FMU is built, its path cannot be printed: {error}", file=sys.stderr)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left is flushed at the end
         return 1
     return 0
 

@@ -1,63 +1,28 @@
-"""C to a shared library, with the compiler that comes in the `ziglang` wheel."""
+"""C to shared libraries, with the compiler that comes in the `ziglang` wheel."""
 
+import atexit
+import functools
 import importlib.util
 import os
-import platform
+import shutil
 import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from fmu_build.errors import BuildError
+from fmu_build.platforms import PLATFORMS, Platform, library_contents
+from fmu_build.universal import universal_library
 
-TIME_LIMIT = 600.0  # s; a first build for Windows compiles its C runtime, about a minute
+TIME_LIMIT = 1800.0  # s; a first build for Windows compiles its C runtime: minutes on two busy cores
+
+AT_ONCE = 2
+"""Platforms compiled at the same time; the compiler itself uses all cores for the files of one."""
 
 FLAGS = ("-std=c99", "-O2", "-s", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared")
 """One set for all platforms. No fast-math and no contraction: platforms must agree to the last bit."""
-
-
-@dataclass(frozen=True)
-class Platform:
-    """A platform to compile for.
-
-    target : the compiler's name for it, with the oldest system to run on
-    fmi2   : folder in binaries/ of FMI 2.0
-    fmi3   : folder in binaries/ of FMI 3.0
-    suffix : of a shared library
-    """
-
-    target: str
-    fmi2: str
-    fmi3: str
-    suffix: str
-
-    def folder(self, fmi: int) -> str:
-        """Returns the folder in binaries/ of an FMI version."""
-        return self.fmi3 if fmi == 3 else self.fmi2
-
-
-PLATFORMS = (
-    Platform("x86_64-linux-gnu.2.17", "linux64", "x86_64-linux", ".so"),
-    Platform("aarch64-linux-gnu.2.17", "aarch64-linux", "aarch64-linux", ".so"),
-    Platform("x86_64-windows-gnu", "win64", "x86_64-windows", ".dll"),
-    Platform("x86_64-macos.11.0", "darwin64", "x86_64-darwin", ".dylib"),
-    Platform("aarch64-macos.11.0", "darwin64", "aarch64-darwin", ".dylib"),
-)
-
-
-def host_platform() -> Platform:
-    """Returns this machine's platform. Raises BuildError on a machine that FMUs are not built for."""
-    machine = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}.get(
-        platform.machine().lower(), platform.machine()
-    )
-    system = platform.system().lower()
-    for candidate in PLATFORMS:
-        if candidate.fmi3 == f"{machine}-{system}":
-            return candidate
-    names = ", ".join(p.fmi3 for p in PLATFORMS)
-    raise BuildError(f"this machine is {machine}-{system}; FMUs are built for {names}")
 
 
 def fmi_headers() -> Path:
@@ -68,58 +33,118 @@ def fmi_headers() -> Path:
     return Path(spec.origin).parent / "c-code"
 
 
+def compile_binaries(
+    sources: Sequence[str], folder: Path, platforms: Sequence[Platform], fmi: int, model_identifier: str
+) -> dict[str, bytes]:
+    """Compiles an FMU's library for each platform and returns the libraries by archive path, binaries/...
+
+    sources : C files, relative to `folder`, their headers beside them
+    folder  : where they lie, and where the compiler may write
+    Raises BuildError with the compiler's own words for each platform where it fails.
+    """
+    contents = library_contents(platforms, fmi)
+    needed = [platform for platform in PLATFORMS if any(platform in parts for parts in contents.values())]
+    thin = _thin_libraries(sources, folder, needed, model_identifier)
+    libraries = {}
+    for name, parts in contents.items():
+        path = f"binaries/{name}/{model_identifier}{parts[0].suffix}"
+        slices = [thin[part] for part in parts]
+        libraries[path] = slices[0] if len(slices) == 1 else universal_library(slices)
+    return libraries
+
+
+def _thin_libraries(
+    sources: Sequence[str], folder: Path, platforms: Sequence[Platform], model_identifier: str
+) -> dict[Platform, bytes]:
+    """Returns the library of each platform; those that fail are all named in one BuildError."""
+
+    def compiled(platform: Platform) -> bytes:
+        library = Path("binaries", platform.name, f"{model_identifier}{platform.suffix}")
+        (folder / library).parent.mkdir(parents=True, exist_ok=True)
+        compile_library([Path(name) for name in sources], platform, library, folder=folder)
+        return (folder / library).read_bytes()
+
+    libraries, problems = {}, []
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        for platform, result in [(platform, pool.submit(compiled, platform)) for platform in platforms]:
+            try:
+                libraries[platform] = result.result()
+            except BuildError as error:
+                problems.append(str(error))
+    if problems:
+        raise BuildError("\n".join(problems))
+    return libraries
+
+
 def compile_library(
     sources: Sequence[Path],
-    include: Sequence[Path],
     platform: Platform,
     output: Path,
     flags: Sequence[str] = FLAGS,
+    folder: Path | None = None,
 ) -> None:
     """Compiles C sources into the shared library `output`.
 
-    sources : C files
-    include : folders of their headers, beside the FMI standard's
-    Raises BuildError with the compiler's own words if it fails, or if it does not end in ten minutes.
+    sources : C files, their headers beside them
+    folder  : what relative paths are relative to, by default the working folder. With relative paths the
+              compiler knows again what it has compiled in another temporary folder.
+    Raises BuildError with the compiler's own words if it fails, or if it does not end in half an hour.
     """
     command = [sys.executable, "-m", "ziglang", "cc", "-target", platform.target, *flags]
     if platform.suffix == ".dylib":
         command.append(f"-Wl,-install_name,@rpath/{output.name}")
-    command += [f"-I{folder}" for folder in include]
     command += ["-isystem", str(fmi_headers()), "-o", str(output), *map(str, sources)]
     if platform.suffix == ".so":
         command.append("-lm")
-    cache = compiler_cache()
-    environment = os.environ | {"ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": str(cache)}
+    problem = _run(command, folder)
+    if problem is not None:
+        raise BuildError(f"compiler for {platform.name} {problem}")
+
+
+def _run(command: Sequence[str], folder: Path | None) -> str | None:
+    """Runs the compiler and returns what it did instead of compiling, if so."""
+    cache = str(compiler_cache())
     try:
         done = subprocess.run(
-            command, env=environment, capture_output=True, text=True, timeout=TIME_LIMIT, check=False
+            command,
+            cwd=folder,
+            env=os.environ | {"ZIG_GLOBAL_CACHE_DIR": cache, "ZIG_LOCAL_CACHE_DIR": cache},
+            capture_output=True,
+            encoding="utf-8",
+            errors="replace",
+            timeout=TIME_LIMIT,
+            check=False,
         )
     except subprocess.TimeoutExpired:
-        raise BuildError(
-            f"compiler for {platform.target} did not end within {TIME_LIMIT:g} s; its cache is {cache}"
-        ) from None
-    if done.returncode != 0:
-        raise BuildError(f"compiler for {platform.target} failed:\n{(done.stderr or done.stdout).strip()}")
+        return f"did not end within {TIME_LIMIT:g} s; its cache is {cache}"
+    return f"failed:\n{(done.stderr or done.stdout).strip()}" if done.returncode else None
 
 
 def compiler_cache() -> Path:
     """Returns a folder where the compiler may keep what it has compiled.
 
-    SUPERVESSEL_CACHE names it; else it is the user's cache folder, or a temporary one where that cannot
-    be written (the compiler never ends without a cache that it can write).
+    SUPERVESSEL_CACHE names it; else it is the user's cache folder, or where that cannot be written a
+    temporary one until the program ends (the compiler never ends without a cache that it can write).
     """
     if named := os.environ.get("SUPERVESSEL_CACHE"):
-        folder = Path(named)
+        folder = Path(named).absolute()
         if _can_write(folder):
-            return folder.resolve()
+            return folder
         raise BuildError(f"SUPERVESSEL_CACHE = {named}: is no folder that can be written")
-    if system := os.environ.get("XDG_CACHE_HOME" if os.name != "nt" else "LOCALAPPDATA"):
-        folder = Path(system) / "supervessel"
-    else:
-        folder = Path.home() / ".cache" / "supervessel"
-    if _can_write(folder):
-        return folder
-    return Path(tempfile.mkdtemp(prefix="supervessel-"))
+    try:
+        system = os.environ.get("XDG_CACHE_HOME" if os.name != "nt" else "LOCALAPPDATA")
+        folder = (Path(system) if system else Path.home() / ".cache").absolute() / "supervessel"
+    except RuntimeError:  # a user without a home
+        return _temporary_cache()
+    return folder if _can_write(folder) else _temporary_cache()
+
+
+@functools.cache
+def _temporary_cache() -> Path:
+    """Returns a folder that all builds of this program share; it is removed at the end."""
+    folder = tempfile.mkdtemp(prefix="supervessel-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
 
 
 def _can_write(folder: Path) -> bool:

@@ -1,0 +1,242 @@
+"""The page that documents an FMU: what the scene holds, frames, variables, equations, what is refused.
+
+One file of HTML without scripts or links to elsewhere, written so that an XML parser reads it too.
+"""
+
+from collections.abc import Iterable, Sequence
+from html import escape
+from importlib.metadata import version
+from math import floor, log10
+from pathlib import Path
+from string import Template
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fmu_build.geometry import Assembly
+from fmu_build.table import Entry, Role
+from supervessel.assembly import joints
+from supervessel.reference import Composite
+from supervessel.scene import Law, Propagator, Scene, Vessel
+
+Cell = str | float | Sequence[float]
+
+TEMPLATE = Path(__file__).with_name("page.html")
+"""The page's fixed text; $names stand where the scene's own go."""
+
+PRIME, MINUS, TIMES = "\N{PRIME}", "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}"
+
+ROLE_TITLES: dict[Role, tuple[str, str]] = {
+    "time": ("Independent variable", ""),
+    "input": (
+        "Inputs",
+        "In co-simulation they hold over a communication step; in model exchange they are continuous.",
+    ),
+    "parameter": ("Parameters", "Fixed once initialisation ends."),
+    "output": (
+        "Outputs",
+        "Those of the end of a communication step; after a set they follow from the new inputs.",
+    ),
+    "state": ("States", "Model exchange: the importer's solver integrates them."),
+    "derivative": ("Derivatives", "Rates of the states."),
+}
+
+LAWS: dict[Law, tuple[str, str]] = {
+    "none": (
+        f"<i>ω</i>{PRIME} = 0",
+        "The angular velocity is given and kept; the inertia tensor has no effect on it.",
+    ),
+    "decoupled": (
+        f"<i>J</i><sub>ii</sub> <i>ω</i><sub>i</sub>{PRIME} = <i>M</i><sub>i</sub>, i = x, y, z",
+        "Each axis for itself: no gyroscopic term, no products of inertia. For slow rates and short spans.",
+    ),
+    "principal": (
+        f"<i>J</i><sub>xx</sub> <i>ω</i><sub>x</sub>{PRIME} = <i>M</i><sub>x</sub> {MINUS} "
+        f"(<i>J</i><sub>zz</sub> {MINUS} <i>J</i><sub>yy</sub>) <i>ω</i><sub>y</sub> <i>ω</i><sub>z</sub>, "
+        "and so on cyclically",
+        "Euler's equations with the diagonal of the tensor, without products of inertia ([CV] eq. (2)).",
+    ),
+    "tensor": (
+        f"<i>J ω</i>{PRIME} = <i>M</i> {MINUS} <i>ω</i> {TIMES} <i>J ω</i>",
+        "Euler's equations with the full inertia tensor ([CV] eq. (1)).",
+    ),
+}
+"""Equation and description of each rotation law, HTML."""
+
+_RK4 = (
+    "The classical Runge-Kutta method of order 4 ([HNW] section II.1) for attitude and angular velocity "
+    "jointly. A communication step is divided so that the body surely turns by no more than "
+    "<code>max_angle_step</code> in a sub-step, spin-up by torque included."
+)
+PROPAGATORS: dict[Propagator, str] = {"auto": _RK4, "rk4": _RK4}
+"""Description of each propagator, HTML."""
+
+STATUS = {
+    2: "The answer is Discard where FMI 2.0 allows it (a step; in model exchange a get and the derivatives "
+    "too), else Error.",
+    3: "The answer is Discard.",
+}
+
+
+def page(parts: Assembly, entries: Sequence[Entry], fmi: int, picture: str) -> str:
+    """Returns the HTML text that documents an FMU.
+
+    parts   : the scene, placed
+    entries : the variable table
+    fmi     : version of the FMI standard, 2 or 3
+    picture : the drawing, an svg element
+    """
+    scene = parts.scene
+    rotation = scene.rotation
+    law_equation, law_text = LAWS[rotation.law]
+    return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
+        name=escape(scene.name),
+        whole=_whole(scene),
+        root=escape(scene.root),
+        facts=_facts(scene, fmi),
+        picture=picture,
+        vessels=_vessels(parts),
+        ports=_ports(scene),
+        composite=_composite(parts.whole),
+        variables=_variables(entries),
+        law=escape(rotation.law),
+        law_equation=law_equation,
+        law_text=law_text,
+        propagator=escape(rotation.propagator),
+        propagator_text=PROPAGATORS[rotation.propagator],
+        definite="" if rotation.law == "none" else " and positive definite",
+        status=STATUS[fmi],
+    )
+
+
+def _whole(scene: Scene) -> str:
+    count = len(scene.vessels)
+    return f"an assembly of {count} docked vessels" if count > 1 else f"the vessel {escape(scene.root)}"
+
+
+def _facts(scene: Scene, fmi: int) -> str:
+    rotation, experiment = scene.rotation, scene.experiment
+    rows: list[tuple[Cell, ...]] = [
+        ("FMI version", f"{fmi}.0"),
+        ("made by", f"supervessel {version('supervessel')}"),
+        ("root vessel", scene.root),
+        ("rotation law", rotation.law),
+        ("propagator", rotation.propagator),
+        ("tolerance", rotation.tolerance),
+        ("max_angle_step [rad]", rotation.max_angle_step),
+    ]
+    if experiment is not None:
+        rows += [("default duration [s]", experiment.duration), ("default step [s]", experiment.step)]
+    return _table("", (), rows)
+
+
+def _vessels(parts: Assembly) -> str:
+    scene = parts.scene
+    hung = {joint.child: joint for joint in joints(scene)}
+    rows: list[tuple[Cell, ...]] = []
+    for number, (name, (rotation, origin)) in enumerate(parts.poses.items(), start=1):
+        vessel = scene.vessels[name]
+        on = " to ".join(hung[name].ports) if name in hung else "root"
+        with np.errstate(all="ignore"):
+            centre = origin + rotation @ np.array(vessel.centre_of_mass)
+        moments = _moments(vessel)
+        rows.append((number, name, vessel.mass, *moments, vessel.centre_of_mass, on, _rounded(centre)))
+    head = ("", "vessel", "mass [kg]", "given as", "moments", "centre of mass [m]", "docked")
+    caption = "Vessels, in vessel axes; last column: centre of mass in the root vessel's axes"
+    return _table(caption, (*head, "in root axes [m]"), rows)
+
+
+def _moments(vessel: Vessel) -> tuple[str, Cell]:
+    """Returns how a vessel's moments are given, with their unit, and the numbers."""
+    if vessel.pmi is not None:
+        return "pmi [m2]", vessel.pmi
+    assert vessel.inertia is not None
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = vessel.inertia
+    return "inertia xx, yy, zz, xy, xz, yz [kg.m2]", (xx, yy, zz, xy, xz, yz)
+
+
+def _ports(scene: Scene) -> str:
+    mates = {one: other for dock in scene.docks for one, other in (dock.ports, dock.ports[::-1])}
+    rows: list[tuple[Cell, ...]] = []
+    for vessel_name, vessel in scene.vessels.items():
+        for port_name, port in vessel.ports.items():
+            name = f"{vessel_name}.{port_name}"
+            rows.append((name, port.position, port.direction, port.alignment, mates.get(name, "free")))
+    head = ("port", "position [m]", "direction", "alignment", "docked to")
+    return _table("Docking ports, in the axes of their vessels", head, rows) if rows else ""
+
+
+def _composite(whole: Composite) -> str:
+    J = whole.inertia
+    rows: list[tuple[Cell, ...]] = [
+        ("mass [kg]", _rounded([whole.mass])),
+        ("barycentre [m]", _rounded(whole.barycentre)),
+        ("pmi [m2]", _rounded(whole.pmi)),
+        ("inertia xx, yy, zz, xy, xz, yz [kg.m2]", _rounded(J[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])),
+    ]
+    if np.all(np.isfinite(J)):
+        rows.append(("principal moments [kg.m2]", _rounded(np.linalg.eigvalsh(J))))
+    return _table("The whole at start values", (), rows)
+
+
+def _variables(entries: Sequence[Entry]) -> str:
+    text = ""
+    head = ("reference", "name", "unit", "start", "range", "description")
+    for role, (title, remark) in ROLE_TITLES.items():
+        rows: list[tuple[Cell, ...]] = [_variable(entry) for entry in entries if entry.role == role]
+        if rows:
+            text += f"<h3>{title}</h3>\n" + (f"<p>{remark}</p>\n" if remark else "") + _table("", head, rows)
+    return text
+
+
+def _variable(entry: Entry) -> tuple[Cell, ...]:
+    variable = entry.variable
+    start = "" if variable.start is None else variable.start
+    bounds = ((variable.low, "≥"), (variable.high, "≤"))
+    span = ", ".join(f"{sign} {_number(bound)}" for bound, sign in bounds if bound is not None)
+    return entry.reference, variable.name, variable.unit, start, span, variable.description
+
+
+def _table(caption: str, head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
+    """Returns a table; texts are escaped. Without `head` the first cell of each row is its heading."""
+    lines = ['<div class="wide"><table>']
+    if caption:
+        lines.append(f"<caption>{escape(caption)}</caption>")
+    if head:
+        cells = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
+        lines.append(f"<thead><tr>{cells}</tr></thead>")
+    lines.append("<tbody>")
+    for row in rows:
+        first = "" if head else f'<th scope="row">{_cell(row[0])}</th>'
+        lines.append(
+            "<tr>" + first + "".join(_data(cell, bool(head)) for cell in row[0 if head else 1 :]) + "</tr>"
+        )
+    return "\n".join([*lines, "</tbody>", "</table></div>\n"])
+
+
+def _data(cell: Cell, in_column: bool) -> str:
+    kind = ' class="number"' if in_column and isinstance(cell, int | float) else ""
+    return f"<td{kind}>{_cell(cell)}</td>"
+
+
+def _cell(cell: Cell) -> str:
+    if isinstance(cell, str):
+        return escape(cell)
+    if isinstance(cell, int | float):
+        return _number(cell)
+    return ", ".join(_number(number) for number in cell)
+
+
+def _number(value: float) -> str:
+    """Returns a number with all the digits that tell it from its neighbours, 1.0 as 1."""
+    return repr(float(value)).removesuffix(".0")
+
+
+def _rounded(vector: ArrayLike) -> list[float]:
+    """Returns calculated numbers to nine digits of the largest one, so that a zero shows no rounding."""
+    numbers = np.asarray(vector, dtype=float)
+    largest = float(np.abs(numbers).max())
+    if largest == 0.0 or not np.isfinite(largest):
+        return [float(number) for number in numbers]
+    digits = 8 - floor(log10(largest))
+    return [round(float(number), digits) + 0.0 for number in numbers]

@@ -1,0 +1,112 @@
+"""The C that an FMU is compiled from, as it lies in the archive: any C99 compiler can build the FMU again.
+
+No file defines FMI2_FUNCTION_PREFIX or FMI3_FUNCTION_PREFIX: a shared library exports the plain names, and an
+importer that links the sources into a program gives the prefix to its compiler. The FMI standard's headers
+are the importer's own.
+"""
+
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+LAYER = Path(__file__).parent / "c"
+"""The scene-independent C."""
+
+OTHER_VERSION = {2: "fmi3", 3: "fmi2"}
+"""Beginning of the names of the layer's files that belong to the other version of FMI."""
+
+NEEDS_LIBM = ("aarch64-linux", "x86_64-linux")
+"""Platforms where sqrt, ceil and the like are in a library of their own."""
+
+EXTERNAL = re.compile(r"^(?!static\b|typedef\b)(?:[A-Za-z_]\w*[ *]+)+(\w+)(?:\(|\[\w*\] =)", re.MULTILINE)
+"""The definition, from a line's beginning, of a function or an array that other files can see."""
+
+PRELUDE = """\
+/* Generated: comes first in each C file. */
+#ifndef PRELUDE_H
+#define PRELUDE_H
+
+/* Products and sums are rounded one by one, never fused: platforms agree to the last bit. */
+#if defined(_MSC_VER)
+#pragma fp_contract(off)
+#elif defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("fp-contract=off")
+#else
+#pragma STDC FP_CONTRACT OFF
+#endif
+
+/* Several FMUs can be linked into one program, and no name is taken for one of the system's. */
+"""
+
+CASADI_NAME = re.compile(r"^#define (casadi_\w+) CASADI_PREFIX\((\w+)\)$", re.MULTILINE)
+"""A name in generated C that stands for another one, model_..."""
+
+
+def layer_files(fmi: int) -> dict[str, str]:
+    """Returns the scene-independent C and H files for an FMI version, by name."""
+    return {
+        path.name: path.read_text(encoding="utf-8")
+        for path in sorted(LAYER.glob("*.[ch]"))
+        if not path.name.startswith(OTHER_VERSION[fmi])
+    }
+
+
+def source_file_names(scene_sources: Iterable[str], fmi: int) -> list[str]:
+    """Returns the names of the C files to compile, in the folder sources/.
+
+    scene_sources : names of the scene's own C and H files
+    """
+    return sorted(name for name in {*scene_sources, *layer_files(fmi)} if name.endswith(".c"))
+
+
+def source_files(scene_sources: Mapping[str, str], fmi: int, model_identifier: str) -> dict[str, bytes]:
+    """Returns the content of the archive's folder sources/, by archive path.
+
+    scene_sources    : the scene's own C and H files by name
+    fmi              : version of the FMI standard; FMI 3.0 has a buildDescription.xml among the files,
+                       FMI 2.0 lists `source_file_names` in modelDescription.xml
+    model_identifier : the FMU's modelIdentifier
+    """
+    texts = layer_files(fmi) | dict(scene_sources)
+    names = source_file_names(scene_sources, fmi)
+    external = _external_names(texts[name] for name in names)
+    for name in names:
+        texts[name] = '#include "prelude.h"\n' + texts[name]
+    texts["prelude.h"] = _prelude(external, model_identifier)
+    if fmi == 3:
+        texts["buildDescription.xml"] = _build_description(model_identifier, names)
+    return {f"sources/{name}": texts[name].encode() for name in sorted(texts)}
+
+
+def _external_names(texts: Iterable[str]) -> set[str]:
+    """Returns the names, other than FMI's, that the C files define with external linkage."""
+    names: set[str] = set()
+    for text in texts:
+        aliases = dict(CASADI_NAME.findall(text))
+        names |= {f"model_{name}" for name in aliases.values()}
+        names |= {name for name in EXTERNAL.findall(text) if name not in aliases}
+    return {name for name in names if not name.startswith("fmi")}
+
+
+def _prelude(names: Iterable[str], model_identifier: str) -> str:
+    """Returns prelude.h, with the model's name for each external name."""
+    lines = "\n".join(f"#define {name} {model_identifier}_{name}" for name in sorted(names))
+    return PRELUDE + lines + "\n\n#endif\n"
+
+
+def _build_description(model_identifier: str, names: Iterable[str]) -> str:
+    """Returns buildDescription.xml: how to compile for any platform, and for those that need libm."""
+    root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
+    for platform in ("", *NEEDS_LIBM):
+        configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=model_identifier)
+        file_set = ET.SubElement(configuration, "SourceFileSet", language="C99")
+        for name in names:
+            ET.SubElement(file_set, "SourceFile", name=name)
+        ET.SubElement(file_set, "IncludeDirectory", name=".")
+        if platform:
+            configuration.set("platform", platform)
+            ET.SubElement(configuration, "Library", name="m", external="true", description="C mathematics")
+    ET.indent(root, "  ")
+    text: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
+    return text.decode() + "\n"

@@ -1,0 +1,180 @@
+"""terminalsAndIcons.xml: which variables belong together in a connection, and the icons that stand for them.
+
+FMI 3.0 defines the file; FMI 2.0.4 and later take it as it is.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, pi, sin
+from xml.etree import ElementTree as ET
+
+from fmu_build.figure import Figure, Item, Path, arrow, regular_polygon, svg
+from fmu_build.raster import png
+from fmu_build.table import Entry
+from supervessel.scene import Scene
+
+FILE_VERSION = {2: "3.0", 3: "3.0"}
+"""The file's fmiVersion by that of the FMU: the version that defines the file."""
+
+POSE = ("position", "direction", "alignment")
+
+ICON_EXTENT = 100.0
+"""The FMU's icon fills the square from -100 to 100, the coordinates that FMI takes by default."""
+TERMINAL_SIZE = 24.0  # in the same coordinates
+TERMINAL_ICON_SIZE = 64  # px
+CONNECTION_COLOUR = "34 34 34"
+
+
+@dataclass(frozen=True)
+class Terminal:
+    """Variables that are connected together.
+
+    kind    : what they are; a terminal of this kind of another model fits. It names the icon file too.
+    rule    : "plug" where all members are needed, "bus" where some do
+    prefix  : what the members' names leave out of the variables' names
+    """
+
+    name: str
+    kind: str
+    rule: str
+    description: str
+    members: Sequence[Entry]
+    prefix: str = ""
+
+    @property
+    def is_input(self) -> bool:
+        """Whether the FMU takes these variables."""
+        return all(entry.role == "input" for entry in self.members)
+
+
+def terminals(scene: Scene, entries: Sequence[Entry]) -> list[Terminal]:
+    """Returns the terminals of a scene: ports whose pose is an input, the torque, the attitude."""
+    found = [
+        Terminal(
+            port,
+            "port_pose",
+            "plug",
+            f"pose of docking port {port} in the axes of {port.partition('.')[0]}",
+            _members(entries, "input", *(f"{port}.{part}" for part in POSE)),
+            prefix=f"{port}.",
+        )
+        for port in scene.inputs.pose
+    ]
+    torque = _members(entries, "input", "torque")
+    attitude = _members(entries, "output", "attitude", "angular_velocity")
+    found.append(
+        Terminal("torque", "torque", "plug", "external torque about the barycentre, body axes", torque)
+    )
+    found.append(
+        Terminal("attitude", "attitude", "bus", "attitude and angular velocity of the body", attitude)
+    )
+    return [terminal for terminal in found if terminal.members]
+
+
+def terminals_and_icons(scene: Scene, entries: Sequence[Entry], fmi: int) -> bytes:
+    """Returns the text of terminalsAndIcons/terminalsAndIcons.xml.
+
+    entries : the variable table
+    fmi     : version of the FMU, 2 or 3
+    """
+    root = ET.Element("fmiTerminalsAndIcons", fmiVersion=FILE_VERSION[fmi])
+    graphics = ET.SubElement(root, "GraphicalRepresentation")
+    extent = {"x1": -ICON_EXTENT, "y1": -ICON_EXTENT, "x2": ICON_EXTENT, "y2": ICON_EXTENT}
+    corners = {name: repr(value) for name, value in extent.items()}
+    ET.SubElement(graphics, "CoordinateSystem", corners | {"suggestedScalingFactorTo_mm": "0.1"})
+    ET.SubElement(graphics, "Icon", corners)
+    found = terminals(scene, entries)
+    if found:
+        parent = ET.SubElement(root, "Terminals")
+        for side, members in (
+            (-1.0, [t for t in found if t.is_input]),
+            (1.0, [t for t in found if not t.is_input]),
+        ):
+            for place, terminal in enumerate(members):
+                _write(parent, terminal, side, place, len(members))
+    ET.indent(root, "  ")
+    text: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
+    return text + b"\n"
+
+
+def terminal_icons(scene: Scene, entries: Sequence[Entry]) -> dict[str, bytes]:
+    """Returns the image files that terminalsAndIcons.xml names, by their place in the archive."""
+    files = {}
+    for kind in sorted({terminal.kind for terminal in terminals(scene, entries)}):
+        figure = Figure(TERMINAL_ICON_SIZE, TERMINAL_ICON_SIZE, kind.replace("_", " "), ICONS[kind])
+        files[f"terminalsAndIcons/{kind}.png"] = png(figure)
+        files[f"terminalsAndIcons/{kind}.svg"] = svg(figure).encode()
+    return files
+
+
+def _members(entries: Sequence[Entry], role: str, *groups: str) -> list[Entry]:
+    """Returns the variables of a role whose name without index is among `groups`, in the table's order."""
+    return [entry for entry in entries if entry.role == role and entry.variable.group in groups]
+
+
+def _write(parent: ET.Element, terminal: Terminal, side: float, place: int, count: int) -> None:
+    """Writes a terminal; it stands on the left (`side` -1) or right edge of the icon, one below the other."""
+    element = ET.SubElement(
+        parent,
+        "Terminal",
+        name=terminal.name,
+        matchingRule=terminal.rule,
+        terminalKind=f"_supervessel_{terminal.kind}",
+        description=terminal.description,
+    )
+    for entry in terminal.members:
+        name = entry.variable.name
+        attributes = {
+            "variableName": name,
+            "memberName": name.removeprefix(terminal.prefix),
+            "variableKind": "signal",
+        }
+        ET.SubElement(element, "TerminalMemberVariable", attributes)
+    spacing = 2.0 * ICON_EXTENT / count
+    half = min(TERMINAL_SIZE, 0.9 * spacing) / 2.0
+    x, y = side * (ICON_EXTENT + half), ICON_EXTENT - spacing * (place + 0.5)
+    box = {"x1": x - half, "y1": y - half, "x2": x + half, "y2": y + half}
+    ET.SubElement(
+        element,
+        "TerminalGraphicalRepresentation",
+        {
+            "defaultConnectionColor": CONNECTION_COLOUR,
+            **{corner: repr(round(value, 6)) for corner, value in box.items()},
+            "iconBaseName": terminal.kind,
+        },
+    )
+
+
+def _port_icon() -> list[Item]:
+    """Returns a docking port: its face, an arrow outwards, a tick along the alignment."""
+    return [
+        Path(((22.0, 10.0), (22.0, 54.0)), stroke="#0072b2", width=6.0),
+        Path(((22.0, 32.0), (22.0, 12.0)), stroke="#d55e00", width=6.0),
+        *arrow((22.0, 32.0), (58.0, 32.0), "#222222", width=4.0, head=14.0),
+        Path(regular_polygon((22.0, 32.0), 6.0, 16), fill="#222222", closed=True),
+    ]
+
+
+def _torque_icon() -> list[Item]:
+    """Returns an arrow around an axis."""
+    angles = [2.4 + 1.5 * pi * i / 24 for i in range(25)]
+    circle = tuple((32.0 + 20.0 * cos(a), 32.0 + 20.0 * sin(a)) for a in angles)
+    return [
+        Path(circle, stroke="#222222", width=4.0),
+        *arrow(circle[-2], (circle[-1][0] + 2.0, circle[-1][1] + 9.0), "#222222", width=4.0, head=14.0),
+        Path(regular_polygon((32.0, 32.0), 5.0, 16), fill="#d55e00", closed=True),
+    ]
+
+
+def _attitude_icon() -> list[Item]:
+    """Returns the three axes of a body."""
+    ends = ((58.0, 47.0), (32.0, 5.0), (6.0, 47.0))
+    colours = ("#b00000", "#007000", "#0000b0")
+    return [
+        item
+        for end, colour in zip(ends, colours, strict=True)
+        for item in arrow((32.0, 34.0), end, colour, width=4.0, head=13.0)
+    ]
+
+
+ICONS = {"port_pose": _port_icon(), "torque": _torque_icon(), "attitude": _attitude_icon()}

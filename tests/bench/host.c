@@ -1,0 +1,190 @@
+/* Loads the library of an FMI 3.0 co-simulation FMU and times its steps from native code, beside a plain RK4 step.
+
+   host LIBRARY TOKEN STEPS SET_COUNT SET_REFERENCE ... GET_COUNT GET_REFERENCE ...
+   Sets the given inputs to slowly changing values around their start values, steps by 1 ms, gets the given outputs.
+   Prints lines "name nanoseconds ratio": the median over short rounds, each of which times the plain step as well;
+   the ratio is to that. */
+#include <dlfcn.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+
+#include "fmi3FunctionTypes.h"
+
+enum { MOST = 4096, ROUNDS = 201 };
+
+static const double STEP_SIZE = 1e-3;
+
+static double now(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void *look_up(void *library, const char *name) {
+    void *symbol = dlsym(library, name);
+    if (!symbol) {
+        fprintf(stderr, "%s: not found\n", name);
+        exit(1);
+    }
+    return symbol;
+}
+
+static void check(fmi3Status status, const char *what) {
+    if (status == fmi3OK) return;
+    fprintf(stderr, "%s: status %d\n", what, (int)status);
+    exit(1);
+}
+
+/* A plain RK4 step of attitude and rate with a full tensor and its inverse, as one would write it by hand. */
+typedef struct {
+    double J[6], inverse[6], torque[3];
+} Plain;
+
+static void times(const double s[6], const double v[3], double out[3]) {
+    out[0] = s[0] * v[0] + s[3] * v[1] + s[4] * v[2];
+    out[1] = s[3] * v[0] + s[1] * v[1] + s[5] * v[2];
+    out[2] = s[4] * v[0] + s[5] * v[1] + s[2] * v[2];
+}
+
+static void plain_rate(const Plain *b, const double x[7], double dx[7]) {
+    const double *w = x + 4;
+    double L[3], right[3];
+    times(b->J, w, L);
+    right[0] = b->torque[0] - (w[1] * L[2] - w[2] * L[1]);
+    right[1] = b->torque[1] - (w[2] * L[0] - w[0] * L[2]);
+    right[2] = b->torque[2] - (w[0] * L[1] - w[1] * L[0]);
+    times(b->inverse, right, dx + 4);
+    dx[0] = -0.5 * (x[1] * w[0] + x[2] * w[1] + x[3] * w[2]);
+    dx[1] = 0.5 * (x[0] * w[0] + x[2] * w[2] - x[3] * w[1]);
+    dx[2] = 0.5 * (x[0] * w[1] + x[3] * w[0] - x[1] * w[2]);
+    dx[3] = 0.5 * (x[0] * w[2] + x[1] * w[1] - x[2] * w[0]);
+}
+
+static void plain_step(const Plain *b, double x[7], double h) {
+    double k1[7], k2[7], k3[7], k4[7], y[7];
+    plain_rate(b, x, k1);
+    for (int i = 0; i < 7; i++) y[i] = x[i] + 0.5 * h * k1[i];
+    plain_rate(b, y, k2);
+    for (int i = 0; i < 7; i++) y[i] = x[i] + 0.5 * h * k2[i];
+    plain_rate(b, y, k3);
+    for (int i = 0; i < 7; i++) y[i] = x[i] + h * k3[i];
+    plain_rate(b, y, k4);
+    for (int i = 0; i < 7; i++) x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
+    const double scale = 1.0 / sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2] + x[3] * x[3]);
+    for (int i = 0; i < 4; i++) x[i] *= scale;
+}
+
+static double time_plain(long steps, double *sink) {
+    Plain b = {{2.0, 3.0, 4.0, 0.1, 0.2, 0.3}, {0.51, 0.34, 0.26, -0.02, -0.02, -0.02}, {0.0, 0.0, 0.0}};
+    double x[7] = {1.0, 0.0, 0.0, 0.0, 0.1, 0.2, 0.3};
+    const double start = now();
+    for (long i = 0; i < steps; i++) {
+        b.torque[0] = 1e-9 * (double)i;
+        plain_step(&b, x, STEP_SIZE);
+    }
+    const double taken = now() - start;
+    *sink += x[0] + x[4];
+    return 1e9 * taken / (double)steps;
+}
+
+static fmi3SetFloat64TYPE *set_values;
+static fmi3GetFloat64TYPE *get_values;
+static fmi3DoStepTYPE *do_step;
+
+typedef struct {
+    fmi3Instance instance;
+    fmi3ValueReference set[MOST], get[MOST];
+    double start[MOST], set_to[MOST], got[MOST];
+    size_t set_count, get_count;
+    double time;
+} Flight;
+
+typedef enum { SET = 1, STEP = 2, GET = 4 } Part;
+
+static double time_flight(Flight *f, long steps, unsigned parts, double change) {
+    fmi3Boolean event, terminate, early;
+    double last;
+    const double start = now();
+    for (long i = 0; i < steps; i++) {
+        if (parts & SET) {
+            const double factor = 1.0 + change * (double)(i + 1);
+            for (size_t k = 0; k < f->set_count; k++) f->set_to[k] = f->start[k] * factor;
+            check(set_values(f->instance, f->set, f->set_count, f->set_to, f->set_count), "set");
+        }
+        if (parts & STEP) {
+            check(do_step(f->instance, f->time, STEP_SIZE, true, &event, &terminate, &early, &last), "step");
+            f->time = last;
+        }
+        if (parts & GET) check(get_values(f->instance, f->get, f->get_count, f->got, f->get_count), "get");
+    }
+    return 1e9 * (now() - start) / (double)steps;
+}
+
+static int by_size(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static double median(double values[ROUNDS]) {
+    qsort(values, ROUNDS, sizeof values[0], by_size);
+    return values[ROUNDS / 2];
+}
+
+static size_t read_references(char **words, fmi3ValueReference references[MOST]) {
+    const size_t count = (size_t)strtoul(words[0], NULL, 10);
+    for (size_t i = 0; i < count && i < MOST; i++)
+        references[i] = (fmi3ValueReference)strtoul(words[i + 1], NULL, 10);
+    return count;
+}
+
+int main(int count, char **words) {
+    if (count < 6) return 2;
+    void *library = dlopen(words[1], RTLD_NOW);
+    if (!library) {
+        fprintf(stderr, "%s\n", dlerror());
+        return 1;
+    }
+    fmi3InstantiateCoSimulationTYPE *instantiate = look_up(library, "fmi3InstantiateCoSimulation");
+    fmi3EnterInitializationModeTYPE *enter = look_up(library, "fmi3EnterInitializationMode");
+    fmi3ExitInitializationModeTYPE *leave = look_up(library, "fmi3ExitInitializationMode");
+    set_values = look_up(library, "fmi3SetFloat64");
+    get_values = look_up(library, "fmi3GetFloat64");
+    do_step = look_up(library, "fmi3DoStep");
+    static Flight f;
+    const long steps = strtol(words[3], NULL, 10);
+    f.set_count = read_references(words + 4, f.set);
+    f.get_count = read_references(words + 5 + f.set_count, f.get);
+    f.instance =
+        instantiate("timed", words[2], NULL, false, false, false, false, NULL, 0, NULL, NULL, NULL);
+    if (!f.instance) return 1;
+    check(enter(f.instance, false, 0.0, 0.0, false, 0.0), "enter");
+    check(leave(f.instance), "leave");
+    check(get_values(f.instance, f.set, f.set_count, f.start, f.set_count), "start");
+    const struct {
+        const char *name;
+        unsigned parts;
+        double change;
+    } cases[] = {
+        {"set+step+get", SET | STEP | GET, 0.0},
+        {"set+step+get,changing", SET | STEP | GET, 1e-9},
+        {"step", STEP, 0.0},
+        {"step+get", STEP | GET, 0.0},
+        {"get", GET, 0.0},
+        {"set", SET, 0.0},
+    };
+    enum { CASES = sizeof cases / sizeof cases[0] };
+    static double taken[CASES + 1][ROUNDS], ratio[CASES + 1][ROUNDS];
+    double sink = 0.0;
+    for (int round = 0; round < ROUNDS; round++)
+        for (int k = 0; k < CASES; k++) {
+            const double plain = time_plain(steps, &sink);
+            taken[CASES][round] = plain;
+            taken[k][round] = time_flight(&f, steps, cases[k].parts, cases[k].change);
+            ratio[k][round] = taken[k][round] / plain;
+        }
+    printf("plain %.2f 1\n", median(taken[CASES]));
+    for (int k = 0; k < CASES; k++) printf("%s %.2f %.3f\n", cases[k].name, median(taken[k]), median(ratio[k]));
+    return isfinite(sink) ? 0 : 1;
+}

@@ -1,0 +1,77 @@
+"""What a step of the FMU costs, in plain RK4 steps of C compiled with the same flags: `make bench`.
+
+Builds the ISS with a DeltaGlider, loads the library natively and times setting inputs, stepping and getting
+outputs in short rounds, each beside the plain step. Quote the ratios: the speed of machines drifts.
+"""
+
+import platform
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from fmpy import extract, read_model_description
+
+from fmu_build import build_fmu
+from fmu_build.compiler import FLAGS, fmi_headers
+from fmu_build.platforms import host_platform
+from supervessel import load_scene
+
+HERE = Path(__file__).parent
+SCENE = HERE.parent.parent / "examples" / "iss_dg.toml"
+STEPS = 2000
+MEANINGS = {
+    "set+step+get": "set inputs, step, get outputs",
+    "set+step+get,changing": "the same, values changing",
+    "step": "step alone",
+    "step+get": "step, get outputs",
+    "get": "get outputs that are current",
+    "set": "set inputs to what they are",
+}
+
+
+def build_host(folder: Path) -> Path:
+    """Returns the program that loads a library and times it, compiled with the FMU's own flags."""
+    host = folder / "host"
+    flags = [flag for flag in FLAGS if flag not in ("-std=c99", "-shared", "-fPIC", "-fvisibility=hidden")]
+    command = [sys.executable, "-m", "ziglang", "cc", "-target", host_platform().target, "-std=gnu99", *flags]
+    command += ["-isystem", str(fmi_headers()), str(HERE / "host.c"), "-o", str(host), "-lm", "-ldl"]
+    subprocess.run(command, check=True)
+    return host
+
+
+def main() -> None:
+    """Prints the table, for the torque alone and for every input and output."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        fmu = build_fmu(load_scene(SCENE), folder / "iss_dg.fmu")
+        unpacked, description = (
+            Path(extract(str(fmu), str(folder / "unpacked"))),
+            read_model_description(str(fmu)),
+        )
+        library = unpacked / "binaries" / host_platform().name / f"iss_dg{host_platform().suffix}"
+        host = build_host(folder)
+        references = {v.name: v.valueReference for v in description.modelVariables}
+        by_causality = {
+            causality: [v.name for v in description.modelVariables if v.causality == causality]
+            for causality in ("input", "output")
+        }
+        flown = [n for n in by_causality["output"] if n.startswith(("attitude", "angular_velocity"))]
+        torque = [n for n in by_causality["input"] if n.startswith("torque")]
+        print(
+            f"{platform.system()} {platform.machine()}, ISS with a DeltaGlider, one sub-step of 1 ms a step\n"
+        )
+        print("| inputs set, outputs got | | ns | plain RK4 steps |\n|---|---|---:|---:|")
+        for inputs, outputs in ((torque, flown), (by_causality["input"], by_causality["output"])):
+            numbers = [str(len(inputs)), *(str(references[n]) for n in inputs)]
+            numbers += [str(len(outputs)), *(str(references[n]) for n in outputs)]
+            command = [str(host), str(library), description.guid, str(STEPS), *numbers]
+            lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
+            for line in lines:
+                case, nanoseconds, ratio = line.split()
+                what = MEANINGS.get(case, "a plain RK4 step")
+                print(f"| {len(inputs)}, {len(outputs)} | {what} | {nanoseconds} | {ratio} |")
+
+
+if __name__ == "__main__":
+    main()
