@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from fmpy import extract, read_model_description
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
-from fmpy.fmi3 import FMU3Slave
+from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.fmi3 import FMU3Model, FMU3Slave
 
 from fmu_build import build_fmu
 from supervessel import Scene, parse_scene
@@ -110,12 +110,20 @@ def _unpacked(path: Path) -> tuple[str, Any]:
 
 
 class Instance:
-    """An instance of a built FMU, of either version, addressed by variable names.
+    """An instance of a built FMU, of either version and interface, addressed by variable names.
 
     Each call returns the FMI status; `log` holds (status, category, message) of each line logged.
     """
 
-    def __init__(self, raw: Mapping[str, Any], fmi: int = 3, logging: bool = True, name: str = "it") -> None:
+    def __init__(
+        self,
+        raw: Mapping[str, Any],
+        fmi: int = 3,
+        logging: bool = True,
+        name: str = "it",
+        exchange: bool = False,
+        **instantiation: Any,
+    ) -> None:
         folder, description = _unpacked(built(raw, fmi))
         self.fmi, self.description = fmi, description
         self.references = {v.name: v.valueReference for v in description.modelVariables}
@@ -127,10 +135,10 @@ class Instance:
             "instanceName": name,
         }
         if fmi == 3:
-            self.fmu = FMU3Slave(**arguments)
-            self.fmu.instantiate(loggingOn=logging, logMessage=self._log3)
+            self.fmu = (FMU3Model if exchange else FMU3Slave)(**arguments)
+            self.fmu.instantiate(loggingOn=logging, logMessage=self._log3, **instantiation)
         else:
-            self.fmu = FMU2Slave(**arguments)
+            self.fmu = (FMU2Model if exchange else FMU2Slave)(**arguments)
             callbacks = fmi2CallbackFunctions()
             callbacks.logger = fmi2CallbackLoggerTYPE(self._log2)
             self.fmu.instantiate(loggingOn=logging, callbacks=callbacks)
@@ -165,6 +173,21 @@ class Instance:
 
     def exit(self) -> int:
         return self._status(self.fmu.exitInitializationMode)
+
+    def run(self) -> int:
+        """Takes an initialised instance of model exchange on to continuous-time mode."""
+        update = self.fmu.updateDiscreteStates if self.fmi == 3 else self.fmu.newDiscreteStates
+        return self._status(update) or self._status(self.fmu.enterContinuousTimeMode)
+
+    def directional(self, unknowns: Sequence[str], knowns: Sequence[str], seed: Any) -> np.ndarray:
+        """Returns the directional derivative of unknowns by knowns along a seed."""
+        u, k = ([self.references[name] for name in names] for names in (unknowns, knowns))
+        return np.array(self.fmu.getDirectionalDerivative(u, k, list(seed)))
+
+    def adjoint(self, unknowns: Sequence[str], knowns: Sequence[str], seed: Any) -> np.ndarray:
+        """Returns the adjoint derivative of unknowns, weighted by a seed, by knowns."""
+        u, k = ([self.references[name] for name in names] for names in (unknowns, knowns))
+        return np.array(self.fmu.getAdjointDerivative(u, k, list(seed), nSensitivity=len(k)))
 
     def step(self, h: float) -> int:
         """Steps by h from the instance's time, which advances if the step succeeds."""

@@ -1,0 +1,199 @@
+"""The FMU's own sources under address and undefined-behaviour sanitizers.
+
+A million random calls of its functions (fuzz.c says what holds whatever is called), and the whole FMU test
+suite on libraries that are built with sanitizers (sanitized.py).
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fmu_build.compiler import fmi_headers
+from support import ISS_DG, built
+
+pytestmark = pytest.mark.robustness
+
+CALLS = 1_200_000
+TIME_LIMIT = 600.0  # s; the runs take about ten seconds each
+SUITE_TIME_LIMIT = 3600.0  # s; about ten minutes on two cores
+FMI = pytest.mark.parametrize("fmi", [2, 3])
+SANITIZED = (
+    "-O1",
+    "-g",
+    "-fsanitize=address,undefined",
+    "-fno-sanitize-recover=all",
+    "-fno-omit-frame-pointer",
+)
+OPTIMISED = ("-O2",)
+STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wstrict-prototypes", "-Werror")
+
+RAW: dict[str, Any] = {
+    "name": "fuzzed",
+    "root": "A",
+    "vessels": {
+        "A": {
+            "mass": 9000.0,
+            "pmi": [3.0, 4.0, 5.0],
+            "ports": {
+                "fore": {
+                    "position": [1.0, 0.5, -0.2],
+                    "direction": [1.0, 0.0, 0.0],
+                    "alignment": [0.0, 1.0, 0.0],
+                }
+            },
+        },
+        "B": {
+            "mass": 3000.0,
+            "pmi": [1.0, 1.5, 2.0],
+            "ports": {
+                "aft": {
+                    "position": [0.0, 0.0, 1.5],
+                    "direction": [0.0, 0.0, 1.0],
+                    "alignment": [0.0, 1.0, 0.0],
+                },
+                "fore": {
+                    "position": [0.0, 0.2, -1.5],
+                    "direction": [0.0, 0.0, -1.0],
+                    "alignment": [0.0, 1.0, 0.0],
+                },
+            },
+        },
+        "C": {
+            "mass": 500.0,
+            "pmi": [0.3, 0.4, 0.5],
+            "ports": {
+                "aft": {
+                    "position": [0.0, 0.0, 0.5],
+                    "direction": [0.0, 0.0, 1.0],
+                    "alignment": [0.0, 1.0, 0.0],
+                }
+            },
+        },
+    },
+    "docks": [{"ports": ["A.fore", "B.aft"]}, {"ports": ["B.fore", "C.aft"]}],
+    "inputs": {"mass": ["B", "C"], "pmi": ["B"], "pose": ["B.aft"], "torque": True},
+    "rotation": {"max_angle_step": 0.5, "angular_velocity": [0.1, -0.2, 0.3]},
+    "outputs": ISS_DG["outputs"],
+}
+"""A scene with inputs of each kind, light enough that extreme values meet ordinary ones."""
+
+
+@cache
+def compiler() -> str:
+    """Returns gcc, if its sanitizers are there; skips where they are not."""
+    if not shutil.which("gcc"):
+        pytest.skip("gcc is missing")
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder, "empty.c")
+        source.write_text("int main(void) { return 0; }\n")
+        command = ["gcc", *SANITIZED, str(source), "-o", str(source.with_suffix(""))]
+        if subprocess.run(command, capture_output=True, check=False).returncode != 0:
+            pytest.skip("gcc's sanitizers are missing: libasan and libubsan")
+    return "gcc"
+
+
+@cache
+def fuzzer(fmi: int, flags: tuple[str, ...]) -> Path:
+    """Returns the fuzzer linked with the sources that lie in an FMU."""
+    folder = Path(tempfile.mkdtemp(prefix="supervessel-fuzz-"))
+    with zipfile.ZipFile(built(RAW, fmi)) as archive:
+        archive.extractall(folder)
+    sources = folder / "sources"
+    common = [compiler(), "-std=c99", "-ffp-contract=off", *flags, f"-DFMI={fmi}"]
+    common += ["-I", str(sources), "-isystem", str(fmi_headers())]
+    own, program = folder / "fuzz.o", folder / "fuzz"
+    run([*common, *STRICT, "-c", str(Path(__file__).with_name("fuzz.c")), "-o", str(own)])
+    run([*common, "-w", str(own), *map(str, sorted(sources.glob("*.c"))), "-lm", "-o", str(program)])
+    return program
+
+
+def run(command: list[str]) -> str:
+    """Returns what a command writes; fails with what it complains of."""
+    done = subprocess.run(command, capture_output=True, text=True, timeout=TIME_LIMIT, check=False)
+    assert done.returncode == 0, f"exit status {done.returncode}\n{done.stderr[-4000:]}"
+    return done.stdout
+
+
+@cache
+def fuzz(fmi: int, flags: tuple[str, ...], seed: int, calls: int) -> str:
+    line = run([str(fuzzer(fmi, flags)), str(seed), str(calls)])
+    print(f"FMI {fmi}, seed {seed}: {line.strip()}")
+    return line
+
+
+def number(line: str, what: str) -> int:
+    """Returns the number that stands before a word in the fuzzer's line."""
+    found = re.search(rf"(\d+) {what}", line)
+    assert found, line
+    return int(found[1])
+
+
+@FMI
+def test_a_million_random_calls_break_no_rule_and_no_memory(fmi, capsys):
+    with capsys.disabled():
+        print()
+        line = fuzz(fmi, SANITIZED, 1, CALLS)
+    assert number(line, "calls") == CALLS
+
+
+@FMI
+def test_random_calls_reach_every_kind_of_answer(fmi):
+    line = fuzz(fmi, SANITIZED, 1, CALLS)
+    # Shares of about half of what was counted when the mixture of calls was chosen.
+    assert number(line, "ok") > 0.8 * CALLS
+    assert number(line, "discarded") > 0.004 * CALLS
+    assert number(line, "errors") > 0.03 * CALLS
+    assert number(line, "steps") > 0.05 * CALLS
+
+
+@FMI
+def test_random_calls_are_answered_alike_bit_for_bit_by_an_optimised_build(fmi):
+    sanitized, optimised = (
+        fuzz(fmi, flags, 1, CALLS).partition("digest ")[2] for flags in (SANITIZED, OPTIMISED)
+    )
+    assert sanitized == optimised
+
+
+@pytest.mark.parametrize("seed", range(2, 6))
+@FMI
+def test_other_random_calls_break_no_rule(fmi, seed):
+    fuzz(fmi, OPTIMISED, seed, CALLS)
+
+
+def preloaded(folder: Path) -> str:
+    """Returns what LD_PRELOAD must name: the sanitizer's runtime, what it needs of C++, and what tames it."""
+    shim = folder / "preload.so"
+    run([compiler(), "-shared", "-fPIC", str(Path(__file__).with_name("preload.c")), "-o", str(shim), "-ldl"])
+    names = ("libasan.so", "libstdc++.so.6")
+    return " ".join([str(shim), *(run([compiler(), f"-print-file-name={name}"]).strip() for name in names)])
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="LD_PRELOAD is missing: it is Linux's")
+def test_the_fmu_test_suite_runs_clean_on_libraries_with_sanitizers(tmp_path):
+    here = Path(__file__).parent
+    # Python keeps memory to its end: leaks are the fuzzer's part.
+    options = "detect_leaks=0:verify_asan_link_order=0"
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join([str(here), os.environ.get("PYTHONPATH", "")]),
+        "SANITIZING_COMPILER": compiler(),
+        "LD_PRELOAD": preloaded(tmp_path),
+        "ASAN_OPTIONS": f"{options}:log_path={tmp_path / 'address'}",
+        "UBSAN_OPTIONS": f"print_stacktrace=1:log_path={tmp_path / 'undefined'}",
+    }
+    command = [sys.executable, "-m", "pytest", "-q", "-n", "auto", "-p", "sanitized"]
+    command += ["-k", "not leave_no_memory_behind", str(here.parent / "fmu")]
+    done = subprocess.run(
+        command, env=environment, capture_output=True, text=True, timeout=SUITE_TIME_LIMIT, check=False
+    )
+    reports = [path.read_text()[:4000] for path in sorted(tmp_path.glob("*.[0-9]*"))]
+    assert reports == []
+    assert done.returncode == 0, done.stdout[-4000:]
