@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         scene = load_scene(options.scene)
         output = options.output or Path(f"{scene.name}.fmu")
-        if output.exists() and output.samefile(options.scene):
+        if output.resolve() == options.scene.resolve():
             raise BuildError(f"{output}: is the scene file itself; the FMU needs a name of its own")
         build_fmu(scene, output, options.fmi, platforms)
     except (SceneError, BuildError) as error:

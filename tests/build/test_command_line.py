@@ -283,3 +283,11 @@ def test_a_user_without_a_home_has_a_cache_that_can_be_written():
         [sys.executable, "-c", script], env=variables, capture_output=True, text=True, check=False
     )
     assert (done.stdout, done.stderr) == ("True\n", "")
+
+
+def test_the_scene_file_is_never_overwritten_by_its_fmu(folder):
+    scene = folder / "ball.toml"
+    before = scene.read_bytes()
+    done = run(folder, "ball.toml", "-o", "../" + folder.name + "/ball.toml")
+    assert (done.returncode, scene.read_bytes()) == (1, before)
+    assert "is the scene file itself" in done.stderr
