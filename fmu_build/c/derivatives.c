@@ -27,9 +27,9 @@ static Status check_roles(Instance *instance, const unsigned references[], size_
 }
 
 /* Checks a request and makes state and composite current. */
-static Status prepare(Instance *instance, const unsigned unknowns[], size_t unknown_count, const unsigned knowns[],
-                      size_t known_count, const double seed[], const double sensitivity[], size_t seed_count,
-                      size_t sensitivity_count) {
+static Status check_request(Instance *instance, const unsigned unknowns[], size_t unknown_count,
+                            const unsigned knowns[], size_t known_count, const double seed[],
+                            const double sensitivity[], size_t seed_count, size_t sensitivity_count) {
     Status status = check_roles(instance, unknowns, unknown_count, allowed_unknowns(instance), "an unknown");
     if (status == STATUS_OK)
         status = check_roles(instance, knowns, known_count, allowed_knowns(instance), "a known");
@@ -82,10 +82,19 @@ static void respond(Instance *instance) {
     response_forward(instance->arg, instance->res, instance->iw, instance->w, 0);
 }
 
+/* Refuses derivatives that leave the range of doubles. */
+static Status check_results(Instance *instance, const unsigned references[], size_t count, const double results[]) {
+    for (size_t i = 0; i < count; i++)
+        if (!isfinite(results[i]))
+            return instance_refuse(instance, "the derivative at %s leaves the range of finite numbers",
+                                   VARIABLES[references[i]].name);
+    return STATUS_OK;
+}
+
 Status derivatives_forward(Instance *instance, const unsigned unknowns[], size_t unknown_count,
                            const unsigned knowns[], size_t known_count, const double seed[], double sensitivity[]) {
-    const Status status = prepare(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity,
-                                  known_count, unknown_count);
+    const Status status = check_request(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity,
+                                        known_count, unknown_count);
     if (status != STATUS_OK) return status;
     Variation *v = &instance->variation;
     memset(v, 0, sizeof *v);
@@ -105,13 +114,13 @@ Status derivatives_forward(Instance *instance, const unsigned unknowns[], size_t
     }
     respond(instance);
     for (size_t i = 0; i < unknown_count; i++) sensitivity[i] = *place(v, unknowns[i]);
-    return STATUS_OK;
+    return check_results(instance, unknowns, unknown_count, sensitivity);
 }
 
 Status derivatives_adjoint(Instance *instance, const unsigned unknowns[], size_t unknown_count,
                            const unsigned knowns[], size_t known_count, const double seed[], double sensitivity[]) {
-    const Status status = prepare(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity,
-                                  unknown_count, known_count);
+    const Status status = check_request(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity,
+                                        unknown_count, known_count);
     if (status != STATUS_OK) return status;
     Variation *v = &instance->variation;
     double on_states[STATE_COUNT];
@@ -138,7 +147,7 @@ Status derivatives_adjoint(Instance *instance, const unsigned unknowns[], size_t
         const double *weight = place(v, knowns[i]);
         sensitivity[i] = weight ? *weight : 0.0;
     }
-    return STATUS_OK;
+    return check_results(instance, knowns, known_count, sensitivity);
 }
 
 Status derivatives_of_time(Instance *instance, const unsigned references[], size_t count, const int orders[],
@@ -159,5 +168,5 @@ Status derivatives_of_time(Instance *instance, const unsigned references[], size
     memset(v->c, 0, sizeof v->c);
     respond(instance);
     for (size_t i = 0; i < count; i++) values[i] = v->y[references[i] - REFERENCE_OUTPUTS];
-    return STATUS_OK;
+    return check_results(instance, references, count, values);
 }

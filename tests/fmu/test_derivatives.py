@@ -570,6 +570,24 @@ def test_derivatives_at_an_attitude_without_length_are_discarded(adjoint):
     instance.free()
 
 
+@pytest.mark.parametrize("adjoint", [False, True], ids=["directional", "adjoint"])
+@pytest.mark.parametrize(
+    ("values_set", "unknown", "known"),
+    [
+        ({"DG.nose.direction": [0.0, 0.0, -1e-310]}, "inertia[1,2]", "DG.nose.direction[1]"),
+        ({"state.angular_velocity": [1e305, 1e305, 1e305]}, "kinetic_energy", "DG.mass"),
+    ],
+    ids=["of a short direction", "at a high rate"],
+)
+def test_derivatives_beyond_the_range_of_numbers_are_discarded(values_set, unknown, known, adjoint):
+    instance = standing("tensor", values("tensor", "start"))
+    assert instance.set(values_set) == OK
+    numbers = [[instance.references[name]] for name in (unknown, known)]
+    assert ask(instance, *numbers, [1.0], [0.0], adjoint=adjoint) == DISCARD
+    assert len(instance.messages()) == 1
+    instance.free()
+
+
 @FMI
 def test_derivatives_leave_all_values_and_the_flight_as_they_were(fmi):
     at = normalised(values("tensor", "drawn"))

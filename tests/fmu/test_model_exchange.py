@@ -453,6 +453,20 @@ def test_outputs_of_an_attitude_without_usable_length_are_discarded_until_it_is_
     instance.free()
 
 
+@pytest.mark.parametrize("name", ["kinetic_energy", "angular_momentum[1]", "der(state.angular_velocity[1])"])
+@FMI
+def test_a_result_beyond_the_range_of_numbers_is_discarded_and_others_are_given(fmi, name):
+    instance = start(fmi=fmi)
+    assert instance.set({"state.angular_velocity": [1e305, 1e305, 1e305]}) == OK
+    assert instance.get_status(name) == DISCARD
+    assert instance.messages() == [
+        f"fmi{fmi}Get{'Float64' if fmi == 3 else 'Real'}: {name} leaves the range of finite numbers"
+    ]
+    assert instance.get_status("attitude") == OK
+    assert list(instance.get("angular_velocity")) == [1e305] * 3
+    instance.free()
+
+
 @FMI
 def test_an_event_update_judges_the_inputs(fmi):
     instance = start(fmi=fmi, mode="event")

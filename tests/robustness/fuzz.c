@@ -636,6 +636,8 @@ static Answer derivative(Slot *slot) {
     answer.status = ask_derivative(slot, adjoint, unknowns, unknown_count, knowns, known_count, null ? NULL : seeds,
                                    seed_count + long_seed, results, result_count);
     if (answer.status == OK) note_values(results, result_count);
+    for (size_t i = 0; i < result_count && answer.status == OK; i++)
+        if (!isfinite(results[i])) fail("a derivative is not finite", slot, OK);
     free(unknowns);
     free(knowns);
     free(seeds);
