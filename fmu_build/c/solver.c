@@ -74,16 +74,17 @@ static Status sub_step(Instance *instance, double h, double taken, double *remai
     return STATUS_OK;
 }
 
-/* Tells the importer of a sub-step's end at now.values[REFERENCE_TIME]. Returns what then remains of the step that ends at `end`. */
-static double listen(Instance *instance, double remaining, double end) {
+/* Tells the importer of a sub-step's end at now.values[REFERENCE_TIME]. Returns when the step shall end: at `end`, or
+   earlier if the importer wants that and can handle it, but not before now. */
+static double listen(Instance *instance, double end) {
     double early = end;
     instance->now.state = INTERMEDIATE;
     instance->within_step = true;
     const bool wanted = instance->sub_step_ended(instance, &early);
     instance->within_step = false;
     if (instance->now.state == INTERMEDIATE) instance->now.state = STEPPING;
-    if (!wanted || !instance->early_return_allowed || !(early < end)) return remaining;
-    return fmin(remaining, fmax(0.0, early - instance->now.values[REFERENCE_TIME]));
+    if (!wanted || !instance->early_return_allowed || !(early < end)) return end;
+    return larger(early, instance->now.values[REFERENCE_TIME]);
 }
 
 Status solver_step(Instance *instance, double time, double h, bool *ended_early) {
@@ -108,12 +109,12 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
         taken += 1.0;
         now->values[REFERENCE_TIME] = remaining > 0.0 ? end - remaining : end;
         if (!instance->sub_step_ended) continue;
-        const double wanted = listen(instance, remaining, end);
+        const double wanted = listen(instance, end);
         if (now->state == TERMINATED) return STATUS_ERROR;
-        if (wanted < remaining) {
+        if (wanted < end) {
             *ended_early = true;
-            end -= remaining - wanted;
-            remaining = wanted;
+            end = wanted;
+            remaining = end - now->values[REFERENCE_TIME];
         }
     }
     return STATUS_OK;
