@@ -21,6 +21,9 @@ from supervessel.scene import Scene
 ARCHIVE_TIME = (1980, 1, 1, 0, 0, 0)
 """Every file in an archive carries the same time, so that a scene gives the same bytes each time."""
 
+WHOLE = "whole.c"
+"""All of an FMU's C in one translation unit, so that the compiler inlines across files."""
+
 
 def build_fmu(scene: Scene, output: str | Path, fmi: int = 3, platforms: Sequence[Platform] = ()) -> Path:
     """Builds the FMU of a scene and returns its path.
@@ -91,8 +94,9 @@ def compile_sources(
                 file = Path(folder, path)
                 file.parent.mkdir(exist_ok=True)
                 file.write_bytes(text)
-            files = [f"sources/{name}" for name in names]
-            return compile_binaries(files, Path(folder), platforms, fmi, identifier)
+            whole = "".join(f'#include "sources/{name}"\n' for name in names)
+            Path(folder, WHOLE).write_text(whole, encoding="utf-8")
+            return compile_binaries([WHOLE], Path(folder), platforms, fmi, identifier)
     except OSError as error:
         raise BuildError(f"{tempfile.gettempdir()}: no room to compile in: {error.strerror}") from None
 

@@ -8,7 +8,7 @@
 
 #include "instance.h"
 
-enum { MESSAGE_SIZE = 256 };
+enum { REPORT_SIZE = 256 };
 
 enum {
     OUTSIDE_CALLBACK = ANY_STATE & ~INTERMEDIATE,
@@ -70,7 +70,7 @@ static bool sub_step_ended(Instance *instance, double *end) {
 static void report(fmi3InstanceEnvironment environment, fmi3LogMessageCallback log_message, const Call *call,
                    const char *problem) {
     if (!log_message) return;
-    char message[MESSAGE_SIZE];
+    char message[REPORT_SIZE];
     snprintf(message, sizeof message, "%s: %s", call->name, problem);
     log_message(environment, fmi3Error, "logStatusError", message);
 }
