@@ -33,3 +33,21 @@ def to_inertial(attitude: ca.SX, vector_body: ca.SX) -> ca.SX:
     w, axis = attitude[0], attitude[1:]
     twice = 2.0 * ca.cross(axis, vector_body)
     return vector_body + w * twice + ca.cross(axis, twice)
+
+
+def product(first: ca.SX, second: ca.SX) -> ca.SX:
+    """Returns the Hamilton product of two quaternions, (4,)."""
+    p, q = first[1:], second[1:]
+    w = first[0] * second[0] - ca.dot(p, q)
+    return ca.vertcat(w, first[0] * q + second[0] * p + ca.cross(p, q))
+
+
+def rotation_matrix(attitude: ca.SX) -> ca.SX:
+    """Returns R_inertial_body, (3, 3), of a unit quaternion, (4,)."""
+    w, x, y, z = ca.vertsplit(attitude)
+    X, Y, Z = 2.0 * x, 2.0 * y, 2.0 * z
+    return ca.vertcat(
+        ca.horzcat(1.0 - (y * Y + z * Z), x * Y - w * Z, x * Z + w * Y),
+        ca.horzcat(x * Y + w * Z, 1.0 - (x * X + z * Z), y * Z - w * X),
+        ca.horzcat(x * Z - w * Y, y * Z + w * X, 1.0 - (x * X + y * Y)),
+    )

@@ -20,7 +20,7 @@ def consistency_problems(raw: Mapping[str, Any]) -> list[str]:
         problems += _moments(f"vessels.{name}", vessel)
         for port, table in tables(vessel, "ports"):
             problems += _directions(f"vessels.{name}.ports.{port}", table)
-    return [*problems, *_experiment(raw), *_ranges(raw), *_total_mass(raw)]
+    return [*problems, *_experiment(raw), *_ranges(raw), *_total_mass(raw), *_propagator(raw)]
 
 
 def _moments(place: str, vessel: Mapping[str, Any]) -> Iterator[str]:
@@ -101,3 +101,16 @@ def _number(table: Mapping[str, Any], key: str) -> float:
     """Returns a finite number, NaN where there is something else."""
     value = table.get(key)
     return float(value) if is_number(value) else math.nan  # type: ignore[arg-type]
+
+
+def _propagator(raw: Mapping[str, Any]) -> Iterator[str]:
+    """Yields why a propagator makes no sense with what the scene has."""
+    rotation, inputs = (raw.get(key, {}) for key in ("rotation", "inputs"))
+    if not (isinstance(rotation, Mapping) and isinstance(inputs, Mapping)):
+        return
+    if rotation.get("propagator") != "split":
+        return
+    if rotation.get("law") == "none":
+        yield 'rotation.propagator = "split": must be "exact" for rotation.law = "none": torque does nothing'
+    elif not inputs.get("torque"):
+        yield 'rotation.propagator = "split": must be "exact" or "auto" without inputs.torque'

@@ -1,13 +1,14 @@
 """The equations of one scene as CasADi functions: what the FMU is generated from and what the twin evaluates.
 
-p are the inputs that shape the composite, u the torque inputs, x = (attitude, angular velocity), and c
-what follows from p alone. c is computed when p changes, everything else uses c. Whatever of c is
+p are the inputs that shape the composite, u the torque inputs, x = (attitude, angular velocity), c what
+follows from p alone, a the principal moments and axes that follow from c, where the scene needs them. c is
+computed when p changes, a when c has changed and somebody asks; everything else uses them. Whatever of c is
 constant in this scene is a number in those functions, not an argument that is read.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import pairwise
 from math import frexp, ldexp
 
@@ -15,10 +16,14 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supervessel.attitude import attitude_dot, to_inertial, unit
+from supervessel.attitude import attitude_dot, rotation_matrix, to_inertial, unit
 from supervessel.docking import composite_body, constant
 from supervessel.inertia import from_upper_triangle, ldl, upper_triangle
-from supervessel.propagators import fastest_square, rk4_step
+from supervessel.principal import principal, principal_forward, quaternion
+from supervessel.propagators import PROPAGATORS, Plan, plan_of
+from supervessel.propagators.bound import fastest_square
+from supervessel.propagators.free import free_functions
+from supervessel.propagators.method import Motion
 from supervessel.quantities import EPSILON
 from supervessel.rotation import LAWS
 from supervessel.scene import Scene
@@ -43,30 +48,49 @@ takes from it is divided by that row's own pivot d_2.
 """
 
 
+PRINCIPAL_OUTPUTS = frozenset({"principal_moments", "principal_axes"})
+
+AXES_SIZE = 7
+"""Length of each part of a: three moments, ascending, and the quaternion from principal to body axes."""
+
+
 @dataclass(frozen=True)
 class Equations:
     """Functions and names of one scene.
 
     composite    : p -> c
+    axes         : c -> a; "principal" of the composite for outputs, "free" of what the law turns freely
     ode          : x, u, c -> rate of x
+    outputs      : x, u, c, a, e -> the outputs y, in the scene's order; e is the last step's error estimate
     fastest_square : x, u, c -> square [rad2/s2] of the fastest rate while turning by the scene's angle
-    step         : x, u, c, h -> x after one sub-step of h [s]
-    outputs      : x, u, c -> the outputs y, in the scene's order
+    step         : x, u, c, h -> x after one sub-step of h [s]; a second result is its estimated error, (2,),
+                   if the scene's method steps by it or the scene asks for it
+    series       : u, c -> what Taylor steps are made from in C: acceleration by torque, (3,), and the map of
+                   the products of two rates, (3, n)
+    free_...     : exact free motion of length t [s] from x, see `propagators.exact`; with C's loop between
+                   start and finish
+    propagation  : those of them that the scene's co-simulation uses
 
     Derivatives: a name ending in _forward takes small changes of the arguments, each after the arguments
     themselves, to those of the results; _reverse takes weights of the results to those of the arguments.
-    response is (ode, outputs).
+    response is (ode, outputs); it takes x, u, c and a, the changes or weights are those of x, u, c.
     """
 
     composite: ca.Function
+    axes: ca.Function
     ode: ca.Function
+    outputs: ca.Function
     fastest_square: ca.Function
     step: ca.Function
-    outputs: ca.Function
+    propagation: tuple[ca.Function, ...]
     composite_forward: ca.Function
     composite_reverse: ca.Function
     response_forward: ca.Function
     response_reverse: ca.Function
+    plan: Plan
+    axes_slices: Mapping[str, slice]
+    error_exponent: int
+    product_count: int
     p_names: tuple[str, ...]
     u_names: tuple[str, ...]
     x_names: tuple[str, ...]
@@ -74,8 +98,15 @@ class Equations:
 
     @property
     def functions(self) -> tuple[ca.Function, ...]:
-        """All functions."""
-        return tuple(getattr(self, f.name) for f in fields(self) if not f.name.endswith("_names"))
+        """The functions that the FMU needs."""
+        always = (self.composite, self.ode, self.outputs, *self.propagation)
+        derivatives = (
+            self.composite_forward,
+            self.composite_reverse,
+            self.response_forward,
+            self.response_reverse,
+        )
+        return (*always, *((self.axes,) if self.axes_slices else ()), *derivatives)
 
 
 def composite_slices() -> dict[str, slice]:
@@ -106,34 +137,103 @@ def equations(scene: Scene) -> Equations:
     u_names = tuple(name for name in inputs if name.startswith("torque["))
     p, u, x, h = (ca.SX.sym(*s) for s in (("p", len(p_names)), ("u", len(u_names)), ("x", 7), ("h", 1)))
 
-    law = LAWS[scene.rotation.law]
+    law, plan = LAWS[scene.rotation.law], plan_of(scene)
     c_of_p = _composite(scene, p_names, p, law.prepare)
     c = ca.SX.sym("c", c_of_p.numel())
     known = ca.vertcat(*(c_of_p[i] if c_of_p[i].is_constant() else c[i] for i in range(c.numel())))
     parts = {name: known[where] for name, where in composite_slices().items()}
+    inertia = from_upper_triangle(parts["inertia"])
     torque = u if u_names else ca.SX.zeros(3)
 
     def rate(state: ca.SX) -> ca.SX:
         acceleration = law.acceleration(parts["law"], state[4:], torque)
         return ca.vertcat(attitude_dot(state[:4], state[4:]), acceleration)
 
+    slices, a_of_c = _axes(scene, plan, inertia)
+    a, e = ca.SX.sym("a", a_of_c.numel()), ca.SX.sym("e")
     by_torque = law.acceleration(parts["law"], ca.SX.zeros(3), torque)
     fastest = fastest_square(x[4:], by_torque, law.growth, scene.rotation.max_angle_step)
-    y = _outputs(scene, x, parts)
+    with_error = "error_estimate" in scene.outputs.names
+    motion = Motion(x, rate, law, parts["law"], torque, h, scene.rotation.tolerance, with_error)
+    method = plan.method or PROPAGATORS["dop853"]
+    assert method.build is not None
+    step = method.build(motion)
+    results = [step.state] if step.error is None else [step.state, step.error]
     args, names = [x, u, c], ["x", "u", "c"]
+    steps = [
+        ca.Function("fastest_square", args, [fastest], names, ["rate_square"]),
+        ca.Function("step", [*args, h], results, [*names, "h"], ["x_next", "error"][: len(results)]),
+    ]
+    products = _without_zeros(law.gyroscopic(parts["law"]))
+    series = ca.Function("series", [u, c], [by_torque, products], ["u", "c"], ["acceleration", "map"])
+    propagation = (
+        {"angle": steps, "error": steps[1:], "series": [series]}[plan.method.control] if plan.method else []
+    )
+    if plan.free != "never":
+        propagation += free_functions(a.numel(), slices["free"])
+    y = _outputs(
+        scene, x, parts, a[slices["principal"]] if "principal" in slices else ca.SX.zeros(AXES_SIZE), e
+    )
     return Equations(
         composite=ca.Function("composite", [p], [c_of_p], ["p"], ["c"]),
+        axes=ca.Function("axes", [c], [a_of_c], ["c"], ["a"]),
         ode=ca.Function("ode", args, [rate(x)], names, ["x_dot"]),
-        fastest_square=ca.Function("fastest_square", args, [fastest], names, ["rate_square"]),
-        step=ca.Function("step", [*args, h], [rk4_step(rate, x, h)], [*names, "h"], ["x_next"]),
-        outputs=ca.Function("outputs", args, [y], names, ["y"]),
+        outputs=ca.Function("outputs", [*args, a, e], [y], [*names, "a", "e"], ["y"]),
+        fastest_square=steps[0],
+        step=steps[1],
+        propagation=tuple(propagation),
+        product_count=products.size2(),
         **_derivatives("composite", [p], [c_of_p]),
-        **_derivatives("response", args, [rate(x), y]),
+        **_derivatives("response", args, [rate(x), y], (a, *_axes_change(inertia, c, a, slices))),
+        plan=plan,
+        axes_slices=slices,
+        error_exponent=step.exponent,
         p_names=p_names,
         u_names=u_names,
         x_names=tuple(variable.name for variable in state_variables(scene)),
         y_names=tuple(variable.name for variable in output_variables(scene)),
     )
+
+
+def _without_zeros(products: ca.SX) -> ca.SX:
+    """Returns a law's map of products, (3, n), without the columns of squares where axes are principal."""
+    columns = [products[:, i] for i in range(products.size2())]
+    diagonal = all(products[i, j].is_zero() for i in range(3) for j in range(products.size2()) if i != j)
+    return ca.densify(ca.horzcat(*columns[:3]) if diagonal and columns else products)
+
+
+def _axes(scene: Scene, plan: Plan, inertia: ca.SX) -> tuple[dict[str, slice], ca.SX]:
+    """Returns where the parts of a stand, and a as an expression of c; both empty where nobody needs them."""
+    wanted = {}
+    if not PRINCIPAL_OUTPUTS.isdisjoint(scene.outputs.names):
+        wanted["principal"] = inertia
+    if plan.free != "never":
+        wanted["free"] = LAWS[scene.rotation.law].turning(inertia)
+    slices: dict[str, slice] = {}
+    found: list[ca.SX] = []
+    for name, tensor in wanted.items():
+        if found and scene.rotation.law == "tensor":  # it turns with the composite's own
+            slices[name] = slices["principal"]
+            continue
+        slices[name] = slice(AXES_SIZE * len(found), AXES_SIZE * (len(found) + 1))
+        moments, rotation = principal(tensor)
+        found.append(ca.vertcat(moments, quaternion(rotation)))
+    return slices, ca.densify(ca.vertcat(ca.SX(0, 1), *found))
+
+
+def _axes_change(inertia: ca.SX, c: ca.SX, a: ca.SX, slices: Mapping[str, slice]) -> tuple[ca.SX, ca.SX]:
+    """Returns a small change of c and what it makes of a, for the part of a that outputs show.
+
+    The axes that were found stand in it as they are: CasADi never differentiates how they were found.
+    """
+    dc = ca.SX.sym("dc", c.numel())
+    da = ca.SX.zeros(a.numel())
+    if "principal" in slices:
+        where = slices["principal"]
+        moments, axes = a[where][:3], rotation_matrix(a[where][3:])
+        change = ca.jtimes(inertia, c, dc)
+        da[where] = ca.vertcat(*principal_forward(moments, axes, change))
+    return dc, da
 
 
 def p_start(scene: Scene) -> NDArray[np.float64]:
@@ -194,16 +294,31 @@ def _composite(scene: Scene, names: tuple[str, ...], p: ca.SX, prepare: Callable
     )
 
 
-def _derivatives(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> dict[str, ca.Function]:
-    """Returns the functions NAME_forward and NAME_reverse."""
+def _derivatives(
+    name: str, arguments: list[ca.SX], results: list[ca.SX], axes: tuple[ca.SX, ca.SX, ca.SX] | None = None
+) -> dict[str, ca.Function]:
+    """Returns the functions NAME_forward and NAME_reverse.
+
+    axes : a, a small change of the last argument, and the change of a that it makes: a is one more argument
+           of both functions, without a change or weight of its own
+    """
     together, changed = ca.vertcat(*arguments), ca.vertcat(*results)
     seeds = [ca.SX.sym(f"d{i}", a.numel()) for i, a in enumerate(arguments)]
     weights = [ca.SX.sym(f"w{i}", r.numel()) for i, r in enumerate(results)]
-    forward = ca.densify(ca.jtimes(changed, together, ca.vertcat(*seeds)))
-    reverse = ca.densify(ca.jtimes(changed, together, ca.vertcat(*weights), True))
+    forward = ca.jtimes(changed, together, ca.vertcat(*seeds))
+    reverse = ca.jtimes(changed, together, ca.vertcat(*weights), True)
+    given = list(arguments)
+    if axes is not None:
+        a, dc, da = axes
+        given.append(a)
+        last = arguments[-1].numel()
+        forward += ca.jtimes(changed, a, ca.substitute(da, dc, seeds[-1]))
+        weight = ca.jtimes(da, dc, ca.jtimes(changed, a, ca.vertcat(*weights), True), True)
+        reverse += ca.vertcat(ca.SX.zeros(together.numel() - last), weight)
+    forward, reverse = ca.densify(forward), ca.densify(reverse)
     return {
-        f"{name}_forward": ca.Function(f"{name}_forward", arguments + seeds, _split(forward, results)),
-        f"{name}_reverse": ca.Function(f"{name}_reverse", arguments + weights, _split(reverse, arguments)),
+        f"{name}_forward": ca.Function(f"{name}_forward", given + seeds, _split(forward, results)),
+        f"{name}_reverse": ca.Function(f"{name}_reverse", given + weights, _split(reverse, arguments)),
     }
 
 
@@ -213,7 +328,9 @@ def _split(vector: ca.SX, like: list[ca.SX]) -> list[ca.SX]:
     return [vector[int(start) : int(end)] for start, end in pairwise(ends)]
 
 
-def _outputs(scene: Scene, x: ca.SX, parts: dict[str, ca.SX]) -> ca.SX:
+def _outputs(
+    scene: Scene, x: ca.SX, parts: dict[str, ca.SX], principal_part: ca.SX, estimate: ca.SX
+) -> ca.SX:
     """Returns the scene's outputs, in its order.
 
     The attitude is brought to unit length once more: as a state it keeps it only to the accuracy of
@@ -231,5 +348,8 @@ def _outputs(scene: Scene, x: ca.SX, parts: dict[str, ca.SX]) -> ca.SX:
         "attitude": attitude,
         "kinetic_energy": 0.5 * ca.dot(omega, momentum),
         "angular_momentum": to_inertial(attitude, momentum),
+        "principal_moments": principal_part[:3],
+        "principal_axes": principal_part[3:],
+        "error_estimate": estimate,
     }
     return ca.densify(ca.vertcat(*(available[name] for name in scene.outputs.names)))

@@ -146,7 +146,7 @@ Direction = Annotated[
 AngularVelocity = Annotated[Vector, vector("rad/s", "three finite numbers")]
 Seconds = Annotated[float, number("s", "a finite number > 0", 0.0, open_low=True)]
 Angle = Annotated[float, number("rad", "a number from 1e-6 to 1", 1e-6, 1.0)]
-Tolerance = Annotated[float, number("", "a finite number > 0", 0.0, open_low=True)]
+Tolerance = Annotated[float, number("", "a number from 1e-15 to 0.1", 1e-15, 0.1)]
 Bounds = Annotated[tuple[float, float], vector("", "two finite numbers [low, high]", size=2)]
 
 

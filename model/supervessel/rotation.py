@@ -2,6 +2,8 @@
 
 A law is two functions. `prepare` turns an inertia tensor into the numbers that the law needs, once for
 each change of inertia; `acceleration` uses them at every stage of a step. A new law is one entry in LAWS.
+For series the same acceleration is also written as what the torque gives plus a linear map of products
+of two rates: `products` and `gyroscopic`.
 """
 
 from collections.abc import Callable
@@ -28,11 +30,21 @@ class RotationLaw:
     prepare      : inertia (3, 3) [kg m2] -> the law's own numbers, (n,)
     acceleration : those, angular velocity (3,) [rad/s], torque (3,) [N m] -> (3,) [rad/s2]; body axes
     growth       : bound of d|omega|/dt over |omega|^2 without torque
+    products     : pairs (i, j), n of them: without torque the acceleration is linear in omega_i omega_j
+    gyroscopic   : the law's numbers -> that linear map, (3, n)
+    turning      : inertia (3, 3) -> the tensor, (3, 3), whose free motion the law describes
     """
 
     prepare: Callable[[ca.SX], ca.SX]
     acceleration: Callable[[ca.SX, ca.SX, ca.SX], ca.SX]
     growth: float
+    products: tuple[tuple[int, int], ...]
+    gyroscopic: Callable[[ca.SX], ca.SX]
+    turning: Callable[[ca.SX], ca.SX]
+
+
+MIXED_PRODUCTS = ((1, 2), (2, 0), (0, 1))
+SQUARES = ((0, 0), (1, 1), (2, 2))
 
 
 def _nothing(inertia: ca.SX) -> ca.SX:
@@ -41,6 +53,23 @@ def _nothing(inertia: ca.SX) -> ca.SX:
 
 def _keep(numbers: ca.SX, omega: ca.SX, torque: ca.SX) -> ca.SX:
     return ca.SX.zeros(3)
+
+
+def _spherical(inertia: ca.SX) -> ca.SX:
+    """Returns a tensor whose free motion is a steady rate."""
+    return ca.SX.eye(3)
+
+
+def _diagonal(inertia: ca.SX) -> ca.SX:
+    return ca.diag(ca.diag(inertia))
+
+
+def _whole(inertia: ca.SX) -> ca.SX:
+    return inertia
+
+
+def _no_products(numbers: ca.SX) -> ca.SX:
+    return ca.SX(3, 0)
 
 
 def _reciprocal_moments(inertia: ca.SX) -> ca.SX:
@@ -65,6 +94,12 @@ def _principal(numbers: ca.SX, omega: ca.SX, torque: ca.SX) -> ca.SX:
     )
 
 
+def _principal_products(numbers: ca.SX) -> ca.SX:
+    """Returns the diagonal of (J_j - J_k)/J_i, (3, 3)."""
+    J, reciprocal = numbers[:3], numbers[3:]
+    return ca.diag(ca.vertcat(J[1] - J[2], J[2] - J[0], J[0] - J[1]) * reciprocal)
+
+
 def _tensor_and_inverse(inertia: ca.SX) -> ca.SX:
     return ca.vertcat(upper_triangle(inertia), upper_triangle(ldl_inverse(*ldl(inertia))))
 
@@ -79,9 +114,28 @@ def _tensor(numbers: ca.SX, omega: ca.SX, torque: ca.SX) -> ca.SX:
     return inverse @ (torque - ca.cross(omega, J @ omega))
 
 
+def _tensor_products(numbers: ca.SX) -> ca.SX:
+    """Returns J^-1 times -(omega x J omega) as a linear map of the products, (3, 6).
+
+    Written out, the moments occur as differences only: a nearly spherical body loses no digits.
+    """
+    J, inverse = from_upper_triangle(numbers[:6]), from_upper_triangle(numbers[6:])
+    xy, xz, yz = J[0, 1], J[0, 2], J[1, 2]
+    rows = (
+        (J[1, 1] - J[2, 2], xy, -xz, 0.0, -yz, yz),
+        (-xy, J[2, 2] - J[0, 0], yz, xz, 0.0, -xz),
+        (xz, -yz, J[0, 0] - J[1, 1], -xy, xy, 0.0),
+    )
+    return inverse @ ca.vertcat(*(ca.horzcat(*row) for row in rows))
+
+
 LAWS: dict[Law, RotationLaw] = {
-    "none": RotationLaw(_nothing, _keep, 0.0),
-    "decoupled": RotationLaw(_reciprocal_moments, _decoupled, 0.0),
-    "principal": RotationLaw(_moments, _principal, GYROSCOPIC_GROWTH),
-    "tensor": RotationLaw(_tensor_and_inverse, _tensor, GYROSCOPIC_GROWTH),
+    "none": RotationLaw(_nothing, _keep, 0.0, (), _no_products, _spherical),
+    "decoupled": RotationLaw(_reciprocal_moments, _decoupled, 0.0, (), _no_products, _spherical),
+    "principal": RotationLaw(
+        _moments, _principal, GYROSCOPIC_GROWTH, MIXED_PRODUCTS, _principal_products, _diagonal
+    ),
+    "tensor": RotationLaw(
+        _tensor_and_inverse, _tensor, GYROSCOPIC_GROWTH, MIXED_PRODUCTS + SQUARES, _tensor_products, _whole
+    ),
 }

@@ -5,7 +5,7 @@ Every number is in SI units. The classes hold what a scene file says, checked on
 """
 
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
@@ -42,6 +42,9 @@ OUTPUT_NAMES = (
     "attitude",
     "kinetic_energy",
     "angular_momentum",
+    "principal_moments",
+    "principal_axes",
+    "error_estimate",
 )
 
 
@@ -58,6 +61,9 @@ VARIABLE_UNITS = {
     "attitude": "",
     "kinetic_energy": "J",
     "angular_momentum": "N.m.s",
+    "principal_moments": "kg.m2",
+    "principal_axes": "",
+    "error_estimate": "rad",
 }
 """Units of inputs and outputs by the last part of their names, as FMI writes them; "" for a pure number."""
 
@@ -99,7 +105,7 @@ Name = Annotated[str, BeforeValidator(_text)]
 Names = Annotated[tuple[str, ...], BeforeValidator(_names)]
 Flag = Annotated[bool, BeforeValidator(_flag)]
 Law = Literal["none", "decoupled", "principal", "tensor"]
-Propagator = Literal["auto", "rk4"]
+Propagator = Literal["auto", "rk4", "dop853", "taylor", "exact", "split"]
 
 
 class Port(Table):
@@ -152,8 +158,8 @@ class Inputs(Table):
 class Rotation(Table):
     """The rotation law, how it is propagated, and the state at the start."""
 
-    law: Annotated[Law, _one_of("none", "decoupled", "principal", "tensor")] = "tensor"
-    propagator: Annotated[Propagator, _one_of("auto", "rk4")] = "auto"
+    law: Annotated[Law, _one_of(*get_args(Law))] = "tensor"
+    propagator: Annotated[Propagator, _one_of(*get_args(Propagator))] = "auto"
     tolerance: Tolerance = 1e-9
     max_angle_step: Angle = 0.05
     angular_velocity: AngularVelocity = ORIGIN

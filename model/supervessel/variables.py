@@ -44,6 +44,7 @@ class InputVariable(Variable):
 
 AXES = ("x", "y", "z")
 QUATERNION = ("w", "x", "y", "z")
+NUMBERS = ("1", "2", "3")
 
 OUTPUT_DESCRIPTIONS = {
     "mass": "total mass",
@@ -54,6 +55,10 @@ OUTPUT_DESCRIPTIONS = {
     "attitude": "unit quaternion from body to inertial axes",
     "kinetic_energy": "rotational kinetic energy",
     "angular_momentum": "angular momentum about the barycentre, inertial axes",
+    "principal_moments": "principal moment of inertia about the barycentre, ascending",
+    "principal_axes": "unit quaternion from principal to body axes, of the four that fit the one with the "
+    "largest scalar part",
+    "error_estimate": "estimated error of the attitude that the last communication step added",
 }
 
 STATES = {"attitude": QUATERNION, "angular_velocity": AXES}
@@ -151,19 +156,22 @@ def _output_nominals(scene: Scene) -> dict[str, float]:
         "angular_velocity": rate,
         "kinetic_energy": 0.5 * moment * rate * rate,
         "angular_momentum": moment * rate,
+        "principal_moments": moment,
     }
 
 
 def _elements(group: str) -> Iterable[tuple[str, str]]:
     """Yields name and label of each element of an output."""
-    if group in ("mass", "kinetic_energy"):
+    if group in ("mass", "kinetic_energy", "error_estimate"):
         yield group, ""
     elif group == "inertia":
         for i, row in enumerate(AXES, start=1):
             for j, column in enumerate(AXES, start=1):
                 yield f"inertia[{i},{j}]", f", {row}{column}"
     else:
-        labels = QUATERNION if group == "attitude" else AXES
+        labels = {"attitude": QUATERNION, "principal_axes": QUATERNION, "principal_moments": NUMBERS}.get(
+            group, AXES
+        )
         for i, label in enumerate(labels, start=1):
             yield f"{group}[{i}]", f", {label}"
 

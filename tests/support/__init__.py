@@ -96,7 +96,7 @@ def body(mass: float = 1000.0, pmi: Sequence[float] = (1.0, 2.0, 2.5), **rotatio
 @cache
 def _built(text: str, fmi: int) -> Path:
     folder = Path(tempfile.mkdtemp(prefix="supervessel-test-"))
-    return build_fmu(parse_scene(json.loads(text)), folder / "scene.fmu", fmi)
+    return build_fmu(scene(json.loads(text)), folder / "scene.fmu", fmi)
 
 
 def built(raw: Mapping[str, Any], fmi: int = 3) -> Path:
@@ -252,8 +252,9 @@ def flying(raw: Mapping[str, Any], fmi: int = 3, **values: Any) -> Iterator[Inst
 
 
 def scene(raw: Mapping[str, Any]) -> Scene:
-    """Returns the scene of a raw one."""
-    return parse_scene(raw)
+    """Returns the scene of a raw one; propagated by RK4 unless it says otherwise: steps can be foretold."""
+    propagator = raw.get("rotation", {}).get("propagator", "rk4")
+    return parse_scene(variant(raw, {"rotation.propagator": propagator}))
 
 
 def relative_error(value: Any, truth: Any) -> float:

@@ -1,0 +1,64 @@
+"""How attitude and angular velocity are carried on in time: the table of methods, one file each.
+
+A method that takes steps builds them in CasADi symbols; the C layer and the twin drive what was built. A new
+one is its file and its line in PROPAGATORS.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from supervessel.propagators import dop853, free, rk4, split, taylor
+from supervessel.propagators.method import Propagator
+
+if TYPE_CHECKING:
+    from supervessel.scene import Scene
+
+PROPAGATORS: dict[str, Propagator] = {
+    "rk4": rk4.PROPAGATOR,
+    "dop853": dop853.PROPAGATOR,
+    "taylor": taylor.PROPAGATOR,
+    "exact": free.PROPAGATOR,
+    "split": split.PROPAGATOR,
+}
+"""The methods; "auto" is a plan made of them."""
+
+TIGHTEST_OF_DOP853 = 1e-6
+"""Tolerance below which "auto" takes Taylor steps: they then cost less (`make bench`)."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a scene's co-simulation uses.
+
+    method : whose steps it takes where free motion does not serve; None: it never does not
+    free   : "never", "always", "between kicks", or "while free": for each step without torque over which the
+             composite stays as it was
+    """
+
+    method: Propagator | None
+    free: str
+
+
+def plan_of(scene: "Scene") -> Plan:
+    """Returns what a scene asks for: its own method, or what "auto" stands for in it."""
+    name = scene.rotation.propagator
+    if name != "auto":
+        chosen = PROPAGATORS[name]
+        return Plan(chosen if chosen.build else None, chosen.free)
+    inputs = scene.inputs
+    if not (inputs.torque or inputs.mass or inputs.pmi or inputs.pose):
+        return Plan(None, "always")
+    method = "dop853" if scene.rotation.tolerance >= TIGHTEST_OF_DOP853 else "taylor"
+    return Plan(PROPAGATORS[method], "while free")
+
+
+def description(scene: "Scene") -> str:
+    """Returns what a scene's propagator does, HTML."""
+    chosen = plan_of(scene)
+    if chosen.free != "while free":
+        return (chosen.method or PROPAGATORS["exact"]).text
+    assert chosen.method is not None
+    return (
+        "A step without torque, before which the composite has not changed, is exact free motion: "
+        f"{PROPAGATORS['exact'].text} Any other step: {chosen.method.text}"
+    )

@@ -1,0 +1,71 @@
+"""Exact free motion seen from the body axes, as functions for C and for the twin."""
+
+import casadi as ca
+
+from supervessel.attitude import product, rotation_matrix, unit
+from supervessel.propagators import exact
+from supervessel.propagators.method import Propagator
+
+STATE_SIZE = 7
+
+
+def free_functions(size: int, where: slice) -> list[ca.Function]:
+    """Returns free motion in four functions, between whose second and last C loops over the third.
+
+    size  : length of a
+    where : of the part of a that the body turns by: moments (3,), quaternion from principal to body axes (4,)
+
+    free_phase  : x, a, t -> the angle [rad] that says how many doublings are needed
+    free_start  : x, a, t, share -> v, k, of the time t share, share a power of two
+    free_double : v, k -> v, of twice the time
+    free_finish : x, a, t, v, k -> x at t
+    Rates and moments must be about 1: the caller scales them by powers of two.
+    """
+    x, a, t, share = (ca.SX.sym(*s) for s in (("x", STATE_SIZE), ("a", size), ("t", 1), ("share", 1)))
+    moments, to_body = a[where][:3], a[where][3:]
+    omega = rotation_matrix(to_body).T @ x[4:]
+    begun = exact.start(moments, omega, t, share)
+    v, k = ca.SX.sym("v", exact.VARYING), ca.SX.sym("k", begun.numel() - exact.VARYING)
+    s = ca.vertcat(v, k)
+    end = _in_body(x, to_body, *exact.finish(moments, omega, t, s))
+    return [
+        ca.Function("free_phase", [x, a, t], [exact.phase(moments, omega, t)], ["x", "a", "t"], ["angle"]),
+        ca.Function(
+            "free_start",
+            [x, a, t, share],
+            [begun[: exact.VARYING], begun[exact.VARYING :]],
+            ["x", "a", "t", "share"],
+            ["v", "k"],
+        ),
+        ca.Function("free_double", [v, k], [exact.double(s)[: exact.VARYING]], ["v", "k"], ["v_next"]),
+        ca.Function("free_finish", [x, a, t, v, k], [end], ["x", "a", "t", "v", "k"], ["x_next"]),
+    ]
+
+
+def free_step(state: ca.SX, moments: ca.SX, to_body: ca.SX, time: ca.SX, doublings: int) -> ca.SX:
+    """Returns the state (attitude, angular velocity), (7,), after free motion.
+
+    moments   : principal, (3,), ascending; any unit
+    to_body   : quaternion from principal to body axes, (4,)
+    time      : [s]
+    doublings : room for that many; NaN where more are needed
+    """
+    omega = rotation_matrix(to_body).T @ state[4:]
+    turn, omega_end = exact.free_turn(moments, omega, time, doublings)
+    return _in_body(state, to_body, turn, omega_end)
+
+
+def _in_body(state: ca.SX, to_body: ca.SX, turn: ca.SX, omega_end: ca.SX) -> ca.SX:
+    """Returns the state after a turn given in principal axes, with the angular velocity there."""
+    back = rotation_matrix(to_body)
+    turn_body = ca.vertcat(turn[0], back @ turn[1:])
+    return ca.vertcat(unit(product(state[:4], turn_body)), back @ omega_end)
+
+
+PROPAGATOR = Propagator(
+    None,
+    "error",
+    "always",
+    "Free motion in one step of any length, from the last instant at which torque or inertia changed in "
+    "value, by addition theorems of Jacobi's elliptic functions ([VS], [F]). Knows no torque.",
+)
