@@ -22,8 +22,9 @@ platforms: .venv/installed-dev
 robustness: .venv/installed-dev
 	$(BIN)/python -m pytest -m robustness tests/robustness
 
-bench: .venv/installed
+bench: .venv/installed-dev
 	$(BIN)/python tests/bench/run.py
+	$(BIN)/python tests/bench/propagators.py
 
 clean:
 	rm -rf .venv build .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -12,7 +12,20 @@ import casadi as ca
 from fmu_build.errors import BuildError
 from fmu_build.table import Entry
 from supervessel.equations import Equations, composite_slices
+from supervessel.propagators.exact import FIRST_ANGLE
 from supervessel.scene import Scene
+
+CHOICES = {
+    "STEPS_NONE": 0,
+    "STEPS_BY_ANGLE": 1,
+    "STEPS_BY_ERROR": 2,
+    "STEPS_BY_SERIES": 3,
+    "FREE_NEVER": 0,
+    "FREE_ALWAYS": 1,
+    "FREE_BETWEEN_KICKS": 2,
+    "FREE_WHILE_FREE": 3,
+}
+"""What the C layer compiles for a plan (`supervessel.propagators`), as the preprocessor sees it."""
 
 
 def model_source(model: Equations) -> str:
@@ -46,6 +59,7 @@ def scene_header(scene: Scene, model: Equations, entries: Sequence[Entry]) -> st
     p_count, u_count = len(model.p_names), len(model.u_names)
     sizes = [(f.sz_arg(), f.sz_res(), f.sz_iw(), f.sz_w()) for f in model.functions]
     arg, res, iw, w = (max(1, *column) for column in zip(*sizes, strict=True))
+    begun = [f for f in model.functions if f.name() == "free_start"]
     constants = {
         "VARIABLE_COUNT": len(entries),
         "INPUT_P_COUNT": p_count,
@@ -61,6 +75,9 @@ def scene_header(scene: Scene, model: Equations, entries: Sequence[Entry]) -> st
         "REFERENCE_DERIVATIVES": references["der(state.attitude[1])"],
         "STATE_COUNT": len(model.x_names),
         "COMPOSITE_COUNT": model.composite.numel_out(0),
+        "AXES_FREE": model.axes_slices["free"].start if "free" in model.axes_slices else 0,
+        "FREE_VARYING": begun[0].numel_out(0) if begun else 0,
+        "FREE_CONSTANT": begun[0].numel_out(1) if begun else 0,
         "COMPOSITE_MASS": where["mass"].start,
         "COMPOSITE_INERTIA": where["inertia"].start,
         "COMPOSITE_MARGINS": where["margins"].start,
@@ -71,15 +88,31 @@ def scene_header(scene: Scene, model: Equations, entries: Sequence[Entry]) -> st
         "WORK_INT": iw,
         "WORK_REAL": w,
     }
-    lines = "\n".join(f"    {name} = {value}," for name, value in constants.items())
+    plan = model.plan
+    macros = {
+        "AXES_COUNT": model.axes.numel_out(0),
+        "STEPS": f"STEPS_BY_{plan.method.control.upper()}" if plan.method else "STEPS_NONE",
+        "FREE": f"FREE_{plan.free.upper().replace(' ', '_')}",
+        "ERROR_EXPONENT": model.error_exponent,
+        "SAFETY": repr(plan.method.safety if plan.method else 1.0),
+        "PRODUCT_COUNT": model.product_count,
+        "TOLERANCE": repr(scene.rotation.tolerance),
+        "MAX_ANGLE_STEP": f"{scene.rotation.max_angle_step!r} /* largest angle of a sub-step [rad] */",
+        "FIRST_ANGLE": f"{FIRST_ANGLE!r} /* up to which free motion is a series [rad] */",
+    }
     return (
         "/* Generated: what the C layer must know of the scene. */\n"
         "#ifndef SCENE_H\n#define SCENE_H\n\n"
-        f"enum {{\n{lines}\n}};\n\n"
-        "/* Largest angle of a sub-step [rad]. */\n"
-        f"#define MAX_ANGLE_STEP {scene.rotation.max_angle_step!r}\n\n"
+        f"enum {{\n{_lines('    {} = {},', constants)}\n}};\n\n"
+        "/* What bounds a step, and when free motion is used. */\n"
+        f"{_lines('#define {} {}', CHOICES)}\n\n"
+        f"{_lines('#define {} {}', macros)}\n\n"
         "#endif\n"
     )
+
+
+def _lines(form: str, values: Mapping[str, object]) -> str:
+    return "\n".join(form.format(name, value) for name, value in values.items())
 
 
 def scene_source(entries: Sequence[Entry], token: str) -> str:
@@ -107,7 +140,7 @@ def _row(entry: Entry, needs: Mapping[int, frozenset[str]]) -> str:
     """Returns a row of the table; `needs` are those of all variables by reference."""
     variable = entry.variable
     own = {
-        "output": frozenset({"OUTPUTS"}),
+        "output": frozenset({"OUTPUTS", "AXES"} if "principal" in variable.group else {"OUTPUTS"}),
         "derivative": frozenset({"RATES"}),
         "state": needs[entry.reference],
     }

@@ -27,6 +27,7 @@ UNITS = {
     "kg": Unit({"kg": 1}, "Mass", "Mass"),
     "m": Unit({"m": 1}, "Length", "Length"),
     "m2": Unit({"m": 2}, "SpecificMoment", "MassNormalisedMomentOfInertia"),
+    "rad": Unit({"rad": 1}, "Angle", "Angle", ("deg", degrees(1.0))),
     "rad/s": Unit({"s": -1, "rad": 1}, "AngularVelocity", "AngularVelocity", ("deg/s", degrees(1.0))),
     "rad/s2": Unit(
         {"s": -2, "rad": 1}, "AngularAcceleration", "AngularAcceleration", ("deg/s2", degrees(1.0))

@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike
 from fmu_build.geometry import Assembly
 from fmu_build.table import Entry, Role
 from supervessel.assembly import joints
+from supervessel.propagators import description
 from supervessel.reference import Composite
-from supervessel.scene import Law, Propagator, Scene, Vessel
+from supervessel.scene import Law, Scene, Vessel
 
 Cell = str | float | Sequence[float]
 
@@ -63,14 +64,6 @@ LAWS: dict[Law, tuple[str, str]] = {
 }
 """Equation and description of each rotation law, HTML."""
 
-_RK4 = (
-    "The classical Runge-Kutta method of order 4 ([HNW] section II.1) for attitude and angular velocity "
-    "jointly. A communication step is divided so that the body surely turns by no more than "
-    "<code>max_angle_step</code> in a sub-step, spin-up by torque included."
-)
-PROPAGATORS: dict[Propagator, str] = {"auto": _RK4, "rk4": _RK4}
-"""Description of each propagator, HTML."""
-
 STATUS = {
     2: "The answer is Discard where FMI 2.0 allows it (a step; in model exchange a get and the derivatives "
     "too), else Error.",
@@ -103,7 +96,7 @@ def page(parts: Assembly, entries: Sequence[Entry], fmi: int, picture: str) -> s
         law_equation=law_equation,
         law_text=law_text,
         propagator=escape(rotation.propagator),
-        propagator_text=PROPAGATORS[rotation.propagator],
+        propagator_text=description(scene),
         definite="" if rotation.law == "none" else " and positive definite",
         status=STATUS[fmi],
     )

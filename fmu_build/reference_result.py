@@ -99,7 +99,7 @@ def _fly(scene: Scene, model: Equations, stimuli: Array, step: float) -> Array |
             if not taken + count <= MOST_SUB_STEPS:
                 return None
             size = remaining / max(1, ceil(count))
-            x = np.array(model.step(x, u, c, size)).ravel()
+            x = np.array(model.step.call([x, u, c, size])[0]).ravel()
             remaining = remaining - size if count > 1.0 else 0.0
         rows.append(_outputs(model, x, held))  # of the step's end: its inputs still hold
         held = inputs
@@ -107,7 +107,8 @@ def _fly(scene: Scene, model: Equations, stimuli: Array, step: float) -> Array |
 
 
 def _outputs(model: Equations, x: Array, inputs: Array) -> Array:
-    return np.array(model.outputs(x, inputs[len(model.p_names) :], _composite(model, inputs))).ravel()
+    c = _composite(model, inputs)
+    return np.array(model.outputs(x, inputs[len(model.p_names) :], c, model.axes(c), 0.0)).ravel()
 
 
 def _csv(names: Sequence[str], rows: Array) -> bytes:

@@ -9,7 +9,7 @@ from typing import Literal
 
 import casadi as ca
 
-from supervessel.equations import Equations
+from supervessel.equations import Equations, composite_slices
 from supervessel.scene import Scene
 from supervessel.variables import (
     Variable,
@@ -88,8 +88,11 @@ def _dependencies(model: Equations, knowns: Sequence[int]) -> dict[Role, list[tu
     """
     p, u, x = (ca.SX.sym(*s) for s in (("p", len(model.p_names)), ("u", len(model.u_names)), ("x", 7)))
     c = model.composite(p)
+    # principal moments and axes follow from every element of the inertia, and not linearly
+    a = ca.repmat(ca.sumsqr(c[composite_slices()["inertia"]]), model.axes.numel_out(0))
     known = ca.vertcat(x, p, u)
-    unknowns: dict[Role, ca.SX] = {"output": model.outputs(x, u, c), "derivative": model.ode(x, u, c)}
+    y = model.outputs(x, u, c, a, 0.0)
+    unknowns: dict[Role, ca.SX] = {"output": y, "derivative": model.ode(x, u, c)}
     return {role: _rows(ca.jacobian(unknown, known), knowns) for role, unknown in unknowns.items()}
 
 

@@ -88,7 +88,8 @@ static Status check_port(Instance *instance, const Variable *variable, const dou
                            group_length(variable), variable->name, values[0], values[1], values[2], PARALLEL_LIMIT);
 }
 
-static Status check_inputs(Instance *instance) {
+/* Judges the inputs; p holds them and gets directions and alignments scaled. */
+static Status check_inputs(Instance *instance, double p[]) {
     Status status = STATUS_OK;
     for (size_t i = REFERENCE_P; i < REFERENCE_TORQUE && status == STATUS_OK; i++) {
         const Variable *variable = &VARIABLES[i];
@@ -96,7 +97,7 @@ static Status check_inputs(Instance *instance) {
         switch (variable->check) {
             case CHECK_MASS: status = check_mass(instance, variable, value); break;
             case CHECK_PMI: status = check_pmi(instance, variable, value); break;
-            case CHECK_PORT: status = check_port(instance, variable, value, &instance->now.p[i - REFERENCE_P]); break;
+            case CHECK_PORT: status = check_port(instance, variable, value, &p[i - REFERENCE_P]); break;
             case CHECK_NONE: break;
         }
     }
@@ -123,21 +124,36 @@ static Status check_composite(Instance *instance, const double *c) {
 Status composite_refresh(Instance *instance) {
     Dynamics *now = &instance->now;
     if (now->composite_is_current) return STATUS_OK;
-    memcpy(now->p, &now->values[REFERENCE_P], INPUT_P_COUNT * sizeof(double));
-    Status status = check_inputs(instance);
+    double *p = instance->variation.inputs, *c = instance->variation.c;
+    memcpy(p, &now->values[REFERENCE_P], INPUT_P_COUNT * sizeof(double));
+    Status status = check_inputs(instance, p);
     if (status != STATUS_OK) return status;
-    double *c = instance->variation.c;
-    instance->arg[0] = now->p;
+    now->composite_is_current = now->c[COMPOSITE_MASS] > 0.0 && memcmp(p, now->p, INPUT_P_COUNT * sizeof(double)) == 0;
+    if (now->composite_is_current) return STATUS_OK; /* changed there and back */
+    instance->arg[0] = p;
     instance->res[0] = c;
     composite(instance->arg, instance->res, instance->iw, instance->w, 0);
     status = check_composite(instance, c);
     if (status != STATUS_OK) return status;
+    memcpy(now->p, p, INPUT_P_COUNT * sizeof(double));
     memcpy(now->c, c, sizeof now->c);
     now->composite_is_current = true;
+    now->axes_are_current = false;
     instance->outputs_are_current = instance->rates_are_current = false;
-    instance_inform(instance, LOG_COMPOSITE, "composite computed at %.10g s: mass = %.10g kg", now->values[REFERENCE_TIME],
-                    c[COMPOSITE_MASS]);
+    instance_inform(instance, LOG_COMPOSITE, "composite computed at %.10g s: mass = %.10g kg",
+                    now->values[REFERENCE_TIME], c[COMPOSITE_MASS]);
     return STATUS_OK;
+}
+
+void composite_refresh_axes(Instance *instance) {
+    if (instance->now.axes_are_current) return;
+#if AXES_COUNT
+    instance->arg[0] = instance->now.c;
+    instance->res[0] = instance->now.a;
+    axes(instance->arg, instance->res, instance->iw, instance->w, 0);
+#endif
+    instance->now.axes_are_current = true;
+    instance->outputs_are_current = false;
 }
 
 void composite_scale_variation(const Instance *instance, double p[]) {

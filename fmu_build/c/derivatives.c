@@ -43,7 +43,9 @@ static Status check_request(Instance *instance, const unsigned unknowns[], size_
         status = instance_start_attitude(instance);
     }
     if (status == STATUS_OK) status = instance_check_attitude(instance);
-    return status == STATUS_OK ? composite_refresh(instance) : status;
+    if (status == STATUS_OK) status = composite_refresh(instance);
+    if (status == STATUS_OK) composite_refresh_axes(instance);
+    return status;
 }
 
 /* Applies the derivative of q = s/|s| to a vector in place; it is symmetric, so it serves both ways. */
@@ -74,9 +76,9 @@ static double *place(Variation *v, unsigned reference) {
 static void respond(Instance *instance) {
     Variation *v = &instance->variation;
     instance_set_arguments(instance);
-    instance->arg[3] = v->x;
-    instance->arg[4] = v->inputs + INPUT_P_COUNT;
-    instance->arg[5] = v->c;
+    instance->arg[4] = v->x;
+    instance->arg[5] = v->inputs + INPUT_P_COUNT;
+    instance->arg[6] = v->c;
     instance->res[0] = v->rate;
     instance->res[1] = v->y;
     response_forward(instance->arg, instance->res, instance->iw, instance->w, 0);
@@ -128,8 +130,8 @@ Status derivatives_adjoint(Instance *instance, const unsigned unknowns[], size_t
     for (size_t i = 0; i < unknown_count; i++) *place(v, unknowns[i]) += seed[i];
     memcpy(on_states, v->x, sizeof on_states);
     instance_set_arguments(instance);
-    instance->arg[3] = v->rate;
-    instance->arg[4] = v->y;
+    instance->arg[4] = v->rate;
+    instance->arg[5] = v->y;
     instance->res[0] = v->x;
     instance->res[1] = v->inputs + INPUT_P_COUNT;
     instance->res[2] = v->c;
@@ -165,6 +167,7 @@ Status derivatives_of_time(Instance *instance, const unsigned references[], size
         status = instance_get_rates(instance, v->x, STATE_COUNT);
     }
     if (status != STATUS_OK) return status;
+    composite_refresh_axes(instance);
     memset(v->c, 0, sizeof v->c);
     respond(instance);
     for (size_t i = 0; i < count; i++) values[i] = v->y[references[i] - REFERENCE_OUTPUTS];

@@ -99,9 +99,9 @@ fmi2Status fmi2SetDebugLogging(fmi2Component instance, fmi2Boolean on, size_t co
 
 fmi2Status fmi2SetupExperiment(fmi2Component instance, fmi2Boolean tolerance_defined, fmi2Real tolerance,
                                fmi2Real start_time, fmi2Boolean stop_time_defined, fmi2Real stop_time) {
-    (void)tolerance_defined, (void)tolerance;
     if (!instance || !instance_admits(instance, &SETUP_EXPERIMENT)) return fmi2Error;
-    return (fmi2Status)instance_set_times(instance, start_time, stop_time_defined != fmi2False, stop_time);
+    return (fmi2Status)instance_set_experiment(instance, tolerance_defined != fmi2False, tolerance, start_time,
+                                               stop_time_defined != fmi2False, stop_time);
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component instance) {

@@ -60,7 +60,7 @@ static bool sub_step_ended(Instance *instance, double *end) {
     const fmi3IntermediateUpdateCallback update = (fmi3IntermediateUpdateCallback)instance->sub_step_callback;
     fmi3Boolean return_requested = fmi3False;
     fmi3Float64 return_time = instance->now.values[REFERENCE_TIME];
-    update(instance->environment, instance->now.values[REFERENCE_TIME], fmi3False, fmi3True, fmi3True, instance->early_return_allowed,
+    update(instance->environment, return_time, fmi3False, fmi3True, fmi3True, instance->early_return_allowed,
            &return_requested, &return_time);
     *end = return_time;
     return return_requested;
@@ -152,9 +152,9 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean on, size_t cou
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolerance_defined, fmi3Float64 tolerance,
                                        fmi3Float64 start_time, fmi3Boolean stop_time_defined, fmi3Float64 stop_time) {
-    (void)tolerance_defined, (void)tolerance;
     if (!instance || !instance_admits(instance, &ENTER_INITIALIZATION)) return fmi3Error;
-    const Status status = instance_set_times(instance, start_time, stop_time_defined, stop_time);
+    const Status status = instance_set_experiment(instance, tolerance_defined, tolerance, start_time,
+                                                  stop_time_defined, stop_time);
     if (status == STATUS_OK) ((Instance *)instance)->now.state = INITIALIZATION;
     return (fmi3Status)status;
 }

@@ -19,6 +19,10 @@ static const struct {
     {"logAll", LOG_ALL},
 };
 
+/* Tolerances that an importer may ask for: what a scene may say, see supervessel/quantities.py. */
+static const double LEAST_TOLERANCE = 1e-15;
+static const double LARGEST_TOLERANCE = 0.1;
+
 static const size_t LOG_CATEGORY_COUNT = sizeof LOG_CATEGORIES / sizeof LOG_CATEGORIES[0];
 
 Instance *instance_new(const char *name, bool model_exchange) {
@@ -41,6 +45,7 @@ void instance_reset(Instance *instance) {
     instance->now.state = INSTANTIATED;
     instance->now.model_exchange = model_exchange;
     instance->outputs_are_current = instance->rates_are_current = false;
+    instance->now.tolerance = TOLERANCE;
     for (size_t i = 0; i < VARIABLE_COUNT; i++) instance->now.values[i] = VARIABLES[i].start;
     instance_start_rate(instance);
     instance_start_attitude(instance);
@@ -123,11 +128,16 @@ Status instance_set_logging(Instance *instance, bool on, size_t count, const cha
     return STATUS_OK;
 }
 
-Status instance_set_times(Instance *instance, double start_time, bool stop_time_defined, double stop_time) {
+Status instance_set_experiment(Instance *instance, bool tolerance_defined, double tolerance, double start_time,
+                               bool stop_time_defined, double stop_time) {
     if (!isfinite(start_time)) return instance_error(instance, "startTime = %.10g s: must be finite", start_time);
     if (stop_time_defined && !(stop_time >= start_time))
         return instance_error(instance, "stopTime = %.10g s: must not be before startTime = %.10g s", stop_time,
                               start_time);
+    if (tolerance_defined && !(tolerance >= LEAST_TOLERANCE && tolerance <= LARGEST_TOLERANCE))
+        return instance_error(instance, "tolerance = %.10g: must be from %g to %g", tolerance, LEAST_TOLERANCE,
+                              LARGEST_TOLERANCE);
+    instance->now.tolerance = tolerance_defined ? tolerance : TOLERANCE;
     instance->now.values[REFERENCE_TIME] = start_time;
     instance->now.start_time = start_time;
     instance->now.stop_time = stop_time;
@@ -161,6 +171,8 @@ Status instance_exit_initialization(Instance *instance) {
     instance_start_rate(instance);
     Status status = instance_start_attitude(instance);
     if (status == STATUS_OK) status = composite_refresh(instance);
-    if (status == STATUS_OK) instance->now.state = instance->now.model_exchange ? EVENT : STEPPING;
-    return status;
+    if (status != STATUS_OK) return status;
+    memcpy(instance->now.stepped_p, instance->now.p, sizeof instance->now.p);
+    instance->now.state = instance->now.model_exchange ? EVENT : STEPPING;
+    return STATUS_OK;
 }

@@ -61,12 +61,20 @@ typedef struct {
     double values[VARIABLE_COUNT];    /* by value reference: time, inputs, parameters, outputs, states, rates */
     double start_time;                /* s */
     double stop_time;                 /* s, meaningful if stop_time_defined */
+    double tolerance;                 /* the importer's or the scene's */
+    double error_estimate;            /* rad, of the last communication step */
     double p[INPUT_P_COUNT + 1];      /* the composite's inputs, directions scaled; + 1: may be none */
     double c[COMPOSITE_COUNT];        /* the composite of p */
+    double a[AXES_COUNT + 1];         /* moments and axes of c */
+    double stepped_p[INPUT_P_COUNT + 1]; /* p of the last communication step, at first of the start */
+    double epoch[STATE_COUNT];        /* the state that free motion is counted from */
+    double elapsed, elapsed_rest;     /* s since then, as an unevaluated sum */
     unsigned state;                   /* a State */
     unsigned model_exchange;          /* else co-simulation */
     unsigned stop_time_defined;
     unsigned composite_is_current;    /* p and c follow from the inputs as they are */
+    unsigned axes_are_current;        /* a follows from c */
+    unsigned epoch_holds;             /* the motion has been free since epoch, with stepped_p */
 } Dynamics;
 
 /* Small changes of, or weights on, what the model's functions take and give. */
@@ -129,15 +137,18 @@ static inline double *instance_rates(Instance *instance) {
     return &instance->now.values[REFERENCE_DERIVATIVES];
 }
 
-/* Points the first arguments of the model's functions to x, u, c. */
+/* Points the first arguments of the model's functions to x, u, c, a, and the estimate. */
 static inline void instance_set_arguments(Instance *instance) {
     instance->arg[0] = instance_states(instance);
     instance->arg[1] = &instance->now.values[REFERENCE_TORQUE];
     instance->arg[2] = instance->now.c;
+    instance->arg[3] = instance->now.a;
+    instance->arg[4] = &instance->now.error_estimate;
 }
 
-/* Sets the time to start at and, if defined, the time not to be passed [s]. */
-Status instance_set_times(Instance *instance, double start_time, bool stop_time_defined, double stop_time);
+/* Sets the time to start at and, if defined, the time not to be passed [s] and the importer's own tolerance. */
+Status instance_set_experiment(Instance *instance, bool tolerance_defined, double tolerance, double start_time,
+                               bool stop_time_defined, double stop_time);
 
 /* Judges what was set, fixes the state at the start and goes on to STEPPING or EVENT. */
 Status instance_exit_initialization(Instance *instance);
@@ -164,12 +175,18 @@ Status instance_get_nominals(Instance *instance, double nominals[], size_t count
 /* composite.c: makes c follow from the inputs, unless it does: judges them and computes the composite. */
 Status composite_refresh(Instance *instance);
 
+/* Makes a follow from c, unless it does. */
+void composite_refresh_axes(Instance *instance);
+
 /* Multiplies a change of p, or weights on p as scaled, by the powers of two that the directions were scaled by. */
 void composite_scale_variation(const Instance *instance, double p[]);
 
 /* solver.c: advances the state from time [s] by one communication step of size h [s], or to where the importer
    wants it to end early. */
 Status solver_step(Instance *instance, double time, double h, bool *ended_early);
+
+/* free.c: carries a state on by a time [s] of motion without torque. */
+Status free_motion(Instance *instance, const double x[], double time, double next[]);
 
 /* derivatives.c: partial derivatives of outputs and rates by inputs and states, at what the outputs are now;
    in INITIALIZATION of outputs, states and rates by inputs and parameters. Forward: sensitivity of unknowns to a

@@ -4,17 +4,25 @@
 #define MODEL_H
 
 int composite(const double **arg, double **res, int *iw, double *w, int mem);         /* p -> c */
+int axes(const double **arg, double **res, int *iw, double *w, int mem);              /* c -> a */
 int ode(const double **arg, double **res, int *iw, double *w, int mem);               /* x, u, c -> rate of x */
-int fastest_square(const double **arg, double **res, int *iw, double *w, int mem);    /* x, u, c -> rad2/s2 */
-int step(const double **arg, double **res, int *iw, double *w, int mem);              /* x, u, c, h -> x */
-int outputs(const double **arg, double **res, int *iw, double *w, int mem);           /* x, u, c -> y */
+int outputs(const double **arg, double **res, int *iw, double *w, int mem);           /* x, u, c, a, e -> y */
 int composite_forward(const double **arg, double **res, int *iw, double *w, int mem); /* p, dp -> dc */
 int composite_reverse(const double **arg, double **res, int *iw, double *w, int mem); /* p, wc -> wp */
 
-/* x, u, c, dx, du, dc -> d rate, dy */
+/* x, u, c, a, dx, du, dc -> d rate, dy */
 int response_forward(const double **arg, double **res, int *iw, double *w, int mem);
 
-/* x, u, c, w rate, wy -> wx, wu, wc */
+/* x, u, c, a, w rate, wy -> wx, wu, wc */
 int response_reverse(const double **arg, double **res, int *iw, double *w, int mem);
+
+/* Of these a scene has those that its propagator uses. */
+int fastest_square(const double **arg, double **res, int *iw, double *w, int mem);    /* x, u, c -> rad2/s2 */
+int step(const double **arg, double **res, int *iw, double *w, int mem);              /* x, u, c, h -> x, error */
+int series(const double **arg, double **res, int *iw, double *w, int mem);            /* u, c -> rad/s2, map */
+int free_phase(const double **arg, double **res, int *iw, double *w, int mem);        /* x, a, t -> rad */
+int free_start(const double **arg, double **res, int *iw, double *w, int mem);        /* x, a, t, share -> v, k */
+int free_double(const double **arg, double **res, int *iw, double *w, int mem);       /* v, k -> v */
+int free_finish(const double **arg, double **res, int *iw, double *w, int mem);       /* x, a, t, v, k -> x */
 
 #endif

@@ -4,8 +4,15 @@
 
 #include "instance.h"
 #include "model.h"
+#include "taylor.h"
 
+#if STEPS == STEPS_BY_ANGLE
 static const double MOST_SUB_STEPS = 1e7;
+#elif STEPS != STEPS_NONE
+static const double MOST_SUB_STEPS = 1e6; /* of about ten times the work */
+#endif
+
+static const double HALF_ULP = 0.5 * DBL_EPSILON;
 
 static double larger(double a, double b) {
     return a > b ? a : b;
@@ -34,44 +41,231 @@ static Status check_times(Instance *instance, double time, double h) {
     return STATUS_OK;
 }
 
-static bool all_finite(const double *x) {
+/* How far a communication step has come. */
+typedef struct {
+    double h, remaining; /* s: its size, and what is left of it */
+    double taken;        /* sub-steps, those that were taken again included */
+    double error;        /* rad, estimated, at the step's end */
+    double next_size;    /* s, of the next sub-step, where the error controls it; 0: not known */
+    bool composite_changed; /* since the last communication step */
+    bool was_free;
+} Progress;
+
+#if STEPS != STEPS_NONE
+
+static bool is_finite(const double x[]) {
     bool finite = true;
     for (size_t i = 0; i < STATE_COUNT; i++) finite = finite && isfinite(x[i]);
     return finite;
 }
 
-/* Takes one sub-step of at most the model's longest, what remains being shared out evenly: the state goes on, *remaining
-   becomes less, and 0 with the last one. */
-static Status sub_step(Instance *instance, double h, double taken, double *remaining) {
+#endif
+
+#if STEPS == STEPS_BY_ANGLE
+
+/* Takes one sub-step of at most the model's longest, what remains being shared out evenly. */
+static Status sub_step(Instance *instance, Progress *progress) {
     double *x = instance_states(instance);
-    double square, next[STATE_COUNT];
+    double square, next[STATE_COUNT], error[2] = {0.0, 0.0};
     instance_set_arguments(instance);
     instance->res[0] = &square;
     fastest_square(instance->arg, instance->res, instance->iw, instance->w, 0);
-    double size = *remaining, count = 1.0;
+    double size = progress->remaining, count = 1.0;
     if (!(size * size * square <= MAX_ANGLE_STEP * MAX_ANGLE_STEP)) {
-        const double needed = ceil(*remaining * sqrt(square) / MAX_ANGLE_STEP);
+        const double needed = ceil(progress->remaining * sqrt(square) / MAX_ANGLE_STEP);
         count = needed > 1.0 || isnan(needed) ? needed : 1.0;
-        size = *remaining / count;
+        size = progress->remaining / count;
     }
-    if (!(taken + count <= MOST_SUB_STEPS))
+    if (!(progress->taken + count <= MOST_SUB_STEPS))
         return instance_refuse(instance,
                                "communicationStepSize = %.10g s needs %.6g sub-steps of max_angle_step = %.10g rad "
                                "with angular_velocity = (%.10g, %.10g, %.10g) rad/s, %.10g s before its end; at most "
                                "%g are taken",
-                               h, taken + count, MAX_ANGLE_STEP, x[4], x[5], x[6], *remaining, MOST_SUB_STEPS);
+                               progress->h, progress->taken + count, MAX_ANGLE_STEP, x[4], x[5], x[6],
+                               progress->remaining, MOST_SUB_STEPS);
     instance->arg[3] = &size;
     instance->res[0] = next;
+    instance->res[1] = error;
     step(instance->arg, instance->res, instance->iw, instance->w, 0);
-    if (!all_finite(next))
+    if (!is_finite(next))
         return instance_refuse(instance,
                                "a sub-step of %.10g s from angular_velocity = (%.10g, %.10g, %.10g) rad/s leaves the "
                                "range of finite numbers",
                                size, x[4], x[5], x[6]);
+    progress->taken += 1.0;
+    progress->error += error[0] + error[1] * progress->remaining + HALF_ULP;
     memcpy(x, next, sizeof next);
-    instance->outputs_are_current = instance->rates_are_current = false;
-    *remaining = count > 1.0 ? *remaining - size : 0.0;
+    progress->remaining = count > 1.0 ? progress->remaining - size : 0.0;
     return STATUS_OK;
+}
+
+#elif STEPS != STEPS_NONE
+
+static double length_of(const double v[3]) {
+    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+#if STEPS == STEPS_BY_SERIES
+
+/* Of the series: 1 - ln(tolerance)/2 costs least; see supervessel/propagators/taylor.py. */
+static int series_order(double tolerance) {
+    const int order = 2 * (int)ceil((1.0 - 0.5 * log(tolerance)) / 2.0);
+    return order < TAYLOR_LEAST_ORDER ? TAYLOR_LEAST_ORDER : order > TAYLOR_MOST_ORDER ? TAYLOR_MOST_ORDER : order;
+}
+
+/* Power of the step that the estimated error grows with. */
+static double error_exponent(const Instance *instance) {
+    return series_order(instance->now.tolerance) + 1.0;
+}
+
+/* From x by size [s] to next; error: estimates of the attitude's [rad] and the rate's [rad/s]. */
+static Status take_step(Instance *instance, double size, double next[], double error[2]) {
+    double acceleration[3], map[3 * PRODUCT_COUNT + 1];
+    instance->arg[0] = &instance->now.values[REFERENCE_TORQUE];
+    instance->arg[1] = instance->now.c;
+    instance->res[0] = acceleration;
+    instance->res[1] = map;
+    series(instance->arg, instance->res, instance->iw, instance->w, 0);
+    taylor_step(instance_states(instance), acceleration, map, size, series_order(instance->now.tolerance), next, error);
+    return STATUS_OK;
+}
+
+#else
+
+static double error_exponent(const Instance *instance) {
+    (void)instance;
+    return ERROR_EXPONENT;
+}
+
+static void call_step(Instance *instance, const double x[], double size, double next[], double error[2]) {
+    instance_set_arguments(instance);
+    instance->arg[0] = x;
+    instance->arg[3] = &size;
+    instance->res[0] = next;
+    instance->res[1] = error;
+    step(instance->arg, instance->res, instance->iw, instance->w, 0);
+}
+
+static Status take_step(Instance *instance, double size, double next[], double error[2]) {
+    call_step(instance, instance_states(instance), size, next, error);
+#if FREE == FREE_BETWEEN_KICKS
+    double kicked[STATE_COUNT], drifted[STATE_COUNT], again[2];
+    memcpy(kicked, next, sizeof kicked);
+    const Status status = free_motion(instance, kicked, size, drifted);
+    if (status != STATUS_OK) return status;
+    call_step(instance, drifted, size, next, again);
+#endif
+    return STATUS_OK;
+}
+
+#endif
+
+/* Size of the first sub-step [s]. Below an angle that any tolerance allows nothing needs to be asked. */
+static double first_size(Instance *instance, const Progress *progress) {
+#if FREE == FREE_BETWEEN_KICKS
+    (void)instance; /* only the torque's strength limits it, and the first estimate tells */
+    return progress->h;
+#else
+    double rates[STATE_COUNT];
+    instance_set_arguments(instance);
+    instance->res[0] = rates;
+    ode(instance->arg, instance->res, instance->iw, instance->w, 0);
+    const double speed = length_of(instance_states(instance) + 4) + sqrt(length_of(rates + 4));
+    if (speed * progress->h <= 0.02) return progress->h;
+    return 2.0 * pow(instance->now.tolerance, 1.0 / error_exponent(instance)) / speed;
+#endif
+}
+
+/* Takes one sub-step whose estimated error, as it shows at the communication step's end, stays within its share of the
+   tolerance by time, or within what rounding amounts to there; one that misses it is taken again, shorter. An error of
+   the rate turns the body on for what remains, but counts no less than relative to the rate. */
+static Status sub_step(Instance *instance, Progress *progress) {
+    double *x = instance_states(instance), next[STATE_COUNT], error[2];
+    const double tolerance = instance->now.tolerance, power = 1.0 / (error_exponent(instance) - 1.0);
+    if (progress->next_size == 0.0) progress->next_size = first_size(instance, progress);
+    for (;;) {
+        double size = progress->next_size;
+        if (!(size < progress->remaining)) size = progress->remaining;
+        else if (2.0 * size > progress->remaining) size = 0.5 * progress->remaining;
+        progress->taken += 1.0;
+        const double count = progress->taken - 1.0 + progress->remaining / size;
+        if (!(count <= MOST_SUB_STEPS))
+            return instance_refuse(instance,
+                                   "communicationStepSize = %.10g s needs %.6g sub-steps for tolerance = %.3g with "
+                                   "angular_velocity = (%.10g, %.10g, %.10g) rad/s, %.10g s before its end; at most %g "
+                                   "are taken",
+                                   progress->h, count, tolerance, x[4], x[5], x[6], progress->remaining,
+                                   MOST_SUB_STEPS);
+        const Status status = take_step(instance, size, next, error);
+        if (status != STATUS_OK) return status;
+        const double speed = larger(length_of(x + 4), length_of(next + 4));
+        const double reach = larger(progress->remaining, speed > 0.0 ? 1.0 / speed : 0.0);
+        const double rounding = HALF_ULP * (1.0 + speed * reach);
+        const double allowed = larger(SAFETY * tolerance * (size / progress->h), rounding);
+        const double found = error[0] + error[1] * reach;
+        const bool usable = is_finite(next) && isfinite(found);
+        if (usable && found <= allowed) {
+            progress->error += found + HALF_ULP * (1.0 + speed * size);
+            memcpy(x, next, sizeof next);
+            progress->remaining = size < progress->remaining ? progress->remaining - size : 0.0;
+            if (progress->remaining > 0.0) progress->next_size = size * fmin(5.0, 0.9 * pow(allowed / found, power));
+            return STATUS_OK;
+        }
+        progress->next_size = size * (usable ? larger(0.2, 0.9 * pow(allowed / found, power)) : 0.2);
+    }
+}
+
+#endif
+
+#if FREE == FREE_ALWAYS || FREE == FREE_WHILE_FREE
+
+static bool is_free(const Instance *instance) {
+    const double *torque = &instance->now.values[REFERENCE_TORQUE];
+    bool zero = true;
+    for (size_t i = INPUT_U_COUNT; i > 0; i--) zero = zero && torque[i - 1] == 0.0;
+    return zero;
+}
+
+/* Takes the whole step from where the motion became free, so that rounding does not pile up over steps. */
+static Status free_step(Instance *instance, Progress *progress) {
+    Dynamics *now = &instance->now;
+    double *x = instance_states(instance), next[STATE_COUNT], elapsed = progress->h, rest = 0.0;
+    const bool goes_on = now->epoch_holds && !progress->composite_changed;
+    if (goes_on) { /* Knuth's sum: elapsed and rest together are exact */
+        elapsed = now->elapsed + progress->h;
+        const double added = elapsed - now->elapsed;
+        rest = now->elapsed_rest + ((now->elapsed - (elapsed - added)) + (progress->h - added));
+    }
+    const Status status = free_motion(instance, goes_on ? now->epoch : x, elapsed + rest, next);
+    if (status != STATUS_OK) return status;
+    if (!goes_on) memcpy(now->epoch, x, sizeof now->epoch);
+    now->elapsed = elapsed;
+    now->elapsed_rest = rest;
+    now->epoch_holds = true;
+    progress->error = 8.0 * HALF_ULP * (1.0 + progress->h * sqrt(x[4] * x[4] + x[5] * x[5] + x[6] * x[6]));
+    memcpy(x, next, sizeof next);
+    progress->remaining = 0.0;
+    return STATUS_OK;
+}
+
+#endif
+
+/* Goes on by one sub-step: the state, what remains of the step and the error change with it. */
+static Status advance(Instance *instance, Progress *progress) {
+#if FREE == FREE_ALWAYS
+    progress->was_free = is_free(instance);
+    if (progress->was_free) return free_step(instance, progress);
+    const double *torque = &instance->now.values[REFERENCE_TORQUE];
+    return instance_refuse(instance,
+                           "torque = (%.10g, %.10g, %.10g) N.m: must be 0 for the propagator exact, which knows free "
+                           "motion alone",
+                           torque[0], torque[1], torque[2]);
+#elif FREE == FREE_WHILE_FREE
+    progress->was_free = !progress->composite_changed && is_free(instance);
+    return progress->was_free ? free_step(instance, progress) : sub_step(instance, progress);
+#else
+    return sub_step(instance, progress);
+#endif
 }
 
 /* Tells the importer of a sub-step's end at now.values[REFERENCE_TIME]. Returns when the step shall end: at `end`, or
@@ -93,29 +287,34 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
     Status status = check_times(instance, time, h);
     if (status == STATUS_OK) status = composite_refresh(instance);
     if (status != STATUS_OK) return status;
-    double start[STATE_COUNT], end = time + h, remaining = h, taken = 0.0;
+    Progress progress = {h, h, 0.0, 0.0, 0.0, false, false};
+    progress.composite_changed = memcmp(now->p, now->stepped_p, sizeof now->p) != 0;
+    double start[STATE_COUNT], end = time + h;
     const double start_time = now->values[REFERENCE_TIME];
     memcpy(start, instance_states(instance), sizeof start);
     const Call *call = instance->call;
-    while (remaining > 0.0) {
+    while (progress.remaining > 0.0) {
         instance->call = call;
-        status = sub_step(instance, h, taken, &remaining);
+        status = advance(instance, &progress);
+        instance->outputs_are_current = instance->rates_are_current = false;
         if (status != STATUS_OK) {
-            instance->outputs_are_current = instance->rates_are_current = false;
             memcpy(instance_states(instance), start, sizeof start);
             now->values[REFERENCE_TIME] = start_time;
             return status;
         }
-        taken += 1.0;
-        now->values[REFERENCE_TIME] = remaining > 0.0 ? end - remaining : end;
+        now->values[REFERENCE_TIME] = progress.remaining > 0.0 ? end - progress.remaining : end;
         if (!instance->sub_step_ended) continue;
         const double wanted = listen(instance, end);
         if (now->state == TERMINATED) return STATUS_ERROR;
         if (wanted < end) {
             *ended_early = true;
             end = wanted;
-            remaining = end - now->values[REFERENCE_TIME];
+            progress.remaining = end - now->values[REFERENCE_TIME];
         }
     }
+    now->error_estimate = progress.error;
+    instance->outputs_are_current = false; /* a listener may have had them computed */
+    now->epoch_holds = progress.was_free;
+    memcpy(now->stepped_p, now->p, sizeof now->p);
     return STATUS_OK;
 }

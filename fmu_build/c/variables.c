@@ -58,6 +58,7 @@ static Status prepare(Instance *instance, unsigned wanted) {
         if (wanted & FOLLOWS_ATTITUDE) status = instance_start_attitude(instance);
     }
     if (status == STATUS_OK && (wanted & FOLLOWS_COMPOSITE)) status = composite_refresh(instance);
+    if (status == STATUS_OK && (wanted & FOLLOWS_AXES)) composite_refresh_axes(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_OUTPUTS)) status = refresh_outputs(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_RATES)) status = refresh_rates(instance);
     return status;
@@ -178,7 +179,8 @@ Status instance_set_states(Instance *instance, const double states[], size_t cou
 
 Status instance_get_rates(Instance *instance, double rates[], size_t count) {
     Status status = check_states(instance, rates, count);
-    if (status == STATUS_OK) status = prepare(instance, FOLLOWS_STATES | FOLLOWS_ATTITUDE | FOLLOWS_COMPOSITE | FOLLOWS_RATES);
+    if (status == STATUS_OK)
+        status = prepare(instance, FOLLOWS_STATES | FOLLOWS_ATTITUDE | FOLLOWS_COMPOSITE | FOLLOWS_RATES);
     for (size_t i = 0; i < STATE_COUNT && status == STATUS_OK; i++) {
         rates[i] = instance_rates(instance)[i];
         if (!isfinite(rates[i])) status = beyond_range(instance, REFERENCE_DERIVATIVES + i);

@@ -22,7 +22,8 @@ enum {
     FOLLOWS_STATES = 2,
     FOLLOWS_ATTITUDE = 4, /* the attitude among the states */
     FOLLOWS_OUTPUTS = 8,
-    FOLLOWS_RATES = 16
+    FOLLOWS_RATES = 16,
+    FOLLOWS_AXES = 32
 };
 
 typedef struct {

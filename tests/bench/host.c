@@ -8,19 +8,13 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <time.h>
 
 #include "fmi3FunctionTypes.h"
+#include "plain.h"
 
 enum { MOST = 4096, ROUNDS = 201 };
 
 static const double STEP_SIZE = 1e-3;
-
-static double now(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 static void *look_up(void *library, const char *name) {
     void *symbol = dlsym(library, name);
@@ -35,58 +29,6 @@ static void check(fmi3Status status, const char *what) {
     if (status == fmi3OK) return;
     fprintf(stderr, "%s: status %d\n", what, (int)status);
     exit(1);
-}
-
-/* A plain RK4 step of attitude and rate with a full tensor and its inverse, as one would write it by hand. */
-typedef struct {
-    double J[6], inverse[6], torque[3];
-} Plain;
-
-static void times(const double s[6], const double v[3], double out[3]) {
-    out[0] = s[0] * v[0] + s[3] * v[1] + s[4] * v[2];
-    out[1] = s[3] * v[0] + s[1] * v[1] + s[5] * v[2];
-    out[2] = s[4] * v[0] + s[5] * v[1] + s[2] * v[2];
-}
-
-static void plain_rate(const Plain *b, const double x[7], double dx[7]) {
-    const double *w = x + 4;
-    double L[3], right[3];
-    times(b->J, w, L);
-    right[0] = b->torque[0] - (w[1] * L[2] - w[2] * L[1]);
-    right[1] = b->torque[1] - (w[2] * L[0] - w[0] * L[2]);
-    right[2] = b->torque[2] - (w[0] * L[1] - w[1] * L[0]);
-    times(b->inverse, right, dx + 4);
-    dx[0] = -0.5 * (x[1] * w[0] + x[2] * w[1] + x[3] * w[2]);
-    dx[1] = 0.5 * (x[0] * w[0] + x[2] * w[2] - x[3] * w[1]);
-    dx[2] = 0.5 * (x[0] * w[1] + x[3] * w[0] - x[1] * w[2]);
-    dx[3] = 0.5 * (x[0] * w[2] + x[1] * w[1] - x[2] * w[0]);
-}
-
-static void plain_step(const Plain *b, double x[7], double h) {
-    double k1[7], k2[7], k3[7], k4[7], y[7];
-    plain_rate(b, x, k1);
-    for (int i = 0; i < 7; i++) y[i] = x[i] + 0.5 * h * k1[i];
-    plain_rate(b, y, k2);
-    for (int i = 0; i < 7; i++) y[i] = x[i] + 0.5 * h * k2[i];
-    plain_rate(b, y, k3);
-    for (int i = 0; i < 7; i++) y[i] = x[i] + h * k3[i];
-    plain_rate(b, y, k4);
-    for (int i = 0; i < 7; i++) x[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
-    const double scale = 1.0 / sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2] + x[3] * x[3]);
-    for (int i = 0; i < 4; i++) x[i] *= scale;
-}
-
-static double time_plain(long steps, double *sink) {
-    Plain b = {{2.0, 3.0, 4.0, 0.1, 0.2, 0.3}, {0.51, 0.34, 0.26, -0.02, -0.02, -0.02}, {0.0, 0.0, 0.0}};
-    double x[7] = {1.0, 0.0, 0.0, 0.0, 0.1, 0.2, 0.3};
-    const double start = now();
-    for (long i = 0; i < steps; i++) {
-        b.torque[0] = 1e-9 * (double)i;
-        plain_step(&b, x, STEP_SIZE);
-    }
-    const double taken = now() - start;
-    *sink += x[0] + x[4];
-    return 1e9 * taken / (double)steps;
 }
 
 static fmi3SetFloat64TYPE *set_values;
@@ -120,16 +62,6 @@ static double time_flight(Flight *f, long steps, unsigned parts, double change) 
         if (parts & GET) check(get_values(f->instance, f->get, f->get_count, f->got, f->get_count), "get");
     }
     return 1e9 * (now() - start) / (double)steps;
-}
-
-static int by_size(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static double median(double values[ROUNDS]) {
-    qsort(values, ROUNDS, sizeof values[0], by_size);
-    return values[ROUNDS / 2];
 }
 
 static size_t read_references(char **words, fmi3ValueReference references[MOST]) {
@@ -184,7 +116,7 @@ int main(int count, char **words) {
             taken[k][round] = time_flight(&f, steps, cases[k].parts, cases[k].change);
             ratio[k][round] = taken[k][round] / plain;
         }
-    printf("plain %.2f 1\n", median(taken[CASES]));
-    for (int k = 0; k < CASES; k++) printf("%s %.2f %.3f\n", cases[k].name, median(taken[k]), median(ratio[k]));
+    printf("plain %.2f 1\n", median(taken[CASES], ROUNDS));
+    for (int k = 0; k < CASES; k++) printf("%s %.2f %.3f\n", cases[k].name, median(taken[k], ROUNDS), median(ratio[k], ROUNDS));
     return isfinite(sink) ? 0 : 1;
 }

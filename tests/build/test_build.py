@@ -18,7 +18,7 @@ from fmu_build.build import compile_sources, generate
 from fmu_build.compiler import compile_library, fmi_headers
 from fmu_build.platforms import PLATFORMS, host_platform
 from fmu_build.sources import source_file_names, source_files
-from supervessel import load_scene, parse_scene
+from supervessel import load_scene
 from support import ISS_DG, body, built, scene, variant
 
 LAYER = Path(fmu_build.__file__).parent / "c"
@@ -242,14 +242,24 @@ STRICT = (
 COMPILERS = {"gcc": ["gcc"], "zig": [sys.executable, "-m", "ziglang", "cc"]}
 
 
-@pytest.mark.parametrize("raw", [ISS_DG, BARE], ids=["everything", "no inputs and outputs"])
+SHAPES = {
+    "every step, free motion": variant(ISS_DG, {"rotation.propagator": "auto"}),
+    "steps by error": variant(ISS_DG, {"rotation.propagator": "dop853"}),
+    "steps by angle": ISS_DG,
+    "kicks": variant(ISS_DG, {"rotation.propagator": "split"}),
+    "no inputs and outputs": variant(BARE, {"rotation.propagator": "exact"}),
+}
+"""What the C layer compiles differently."""
+
+
+@pytest.mark.parametrize("raw", SHAPES.values(), ids=SHAPES)
 @pytest.mark.parametrize("compiler", COMPILERS)
 @both_versions
 def test_the_hand_written_c_compiles_without_warnings(tmp_path, fmi, compiler, raw):
     command = COMPILERS[compiler]
     if shutil.which(command[0]) is None:
         pytest.skip(f"{command[0]} is not installed")
-    (tmp_path / "scene.h").write_text(generate(parse_scene(raw), fmi)[0]["scene.h"])
+    (tmp_path / "scene.h").write_text(generate(scene(raw), fmi)[0]["scene.h"])
     other = f"fmi{5 - fmi}"
     sources = [path for path in sorted(LAYER.glob("*.c")) if not path.name.startswith(other)]
     assert len(sources) >= 6

@@ -136,13 +136,13 @@ def test_integers_are_read_as_the_floats_they_stand_for():
         "vessels.ISS.pmi": [385, 719, 508],
         f"{NOSE}.direction": [0, 0, -1],
         "rotation.angular_velocity": [0, 1, 0],
-        "rotation.tolerance": 1,
+        "rotation.max_angle_step": 1,
         "experiment": {"duration": 600, "step": 1},
         "inputs.range": {"DG.mass": [0, 30000]},
     }
     floats = {
         "rotation.angular_velocity": [0.0, 1.0, 0.0],
-        "rotation.tolerance": 1.0,
+        "rotation.max_angle_step": 1.0,
         "experiment": {"duration": 600.0, "step": 1.0},
         "inputs.range": {"DG.mass": [0.0, 30000.0]},
     }

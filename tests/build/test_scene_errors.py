@@ -25,6 +25,7 @@ IDENTIFIER = "must be a letter or underscore, then letters, digits, underscores"
 MODEL_NAME = "must be a letter, then letters, digits and single underscores"
 HUGE = "an integer of 333 hexadecimal digits"
 NUMBER = "must be a finite number >= 0"
+TOLERANCES = "must be a number from 1e-15 to 0.1"
 POSITIVE = "must be a finite number > 0"
 THREE = "must be three finite numbers"
 MOMENTS = "must be three finite numbers >= 0"
@@ -374,9 +375,9 @@ IMPOSSIBLE_NUMBERS = [
     case(
         "propagator",
         {"rotation.propagator": "euler"},
-        'rotation.propagator = "euler": must be one of auto, rk4',
+        'rotation.propagator = "euler": must be one of auto, rk4, dop853, taylor, exact, split',
     ),
-    case("tolerance", {"rotation.tolerance": 0}, f"rotation.tolerance = 0: {POSITIVE}"),
+    case("tolerance", {"rotation.tolerance": 0}, f"rotation.tolerance = 0: {TOLERANCES}"),
     case(
         "angle",
         {"rotation.max_angle_step": -0.05},

@@ -365,15 +365,19 @@ static Answer enter(Slot *slot) {
     const double start = once_in(30) ? no_number() : once_in(4) ? uniform(-1e5, 1e5) : 0.0;
     const bool stops = once_in(8);
     const double stop = once_in(8) ? no_number() : start + uniform(-1.0, 1e3);
-    Answer answer = {OK, expect(slot, INSTANTIATED, isfinite(start) && (!stops || stop >= start))};
+    const bool given = once_in(2);
+    const double tolerance = once_in(20) ? odd_number() : pow(10.0, uniform(-15.0, -1.0));
+    const bool right = isfinite(start) && (!stops || stop >= start) &&
+                       (!given || (tolerance >= 1e-15 && tolerance <= 0.1));
+    Answer answer = {OK, expect(slot, INSTANTIATED, right)};
 #if FMI == 3
     called = "fmi3EnterInitializationMode";
-    answer.status = (int)fmi3EnterInitializationMode(slot->component, once_in(2), odd_number(), start, stops, stop);
+    answer.status = (int)fmi3EnterInitializationMode(slot->component, given, tolerance, start, stops, stop);
     if (answer.status == OK) slot->now = (Known){INITIALIZATION, start, stops};
 #else
     if (once_in(2)) {
         called = "fmi2SetupExperiment";
-        answer.status = (int)fmi2SetupExperiment(slot->component, once_in(2), odd_number(), start, stops, stop);
+        answer.status = (int)fmi2SetupExperiment(slot->component, given, tolerance, start, stops, stop);
         if (answer.status == OK) slot->now = (Known){INSTANTIATED, start, stops};
         return answer;
     }

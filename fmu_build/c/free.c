@@ -1,0 +1,125 @@
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "instance.h"
+#include "model.h"
+
+#if FREE != FREE_NEVER
+
+/* Most doublings of the first angle: a turn of 2e9 rad. */
+enum { MOST_DOUBLINGS = 33 };
+
+/* A tumble from a spin about the middle axis grows by a factor e per radian of phase at most. A rate that is tiny beside
+   the others is followed in pieces of LONGEST_TINY until it is not, or for so many pieces that it never will be. */
+static const double TINY = 0x1p-400;
+static const double LONGEST_TINY = 128.0; /* rad */
+enum { MOST_PIECES = 8 };
+
+/* The state and the free part of a, scaled by powers of two so that rates and moments are about 1; the time then is
+   about the angle turned. */
+typedef struct {
+    double x[STATE_COUNT], a[AXES_COUNT], time;
+    int exponent; /* of the rates */
+} Scaled;
+
+static Scaled scale(const Instance *instance, const double x[], double time) {
+    Scaled scaled;
+    memcpy(scaled.x, x, sizeof scaled.x);
+    memcpy(scaled.a, instance->now.a, sizeof scaled.a);
+    int of_moments;
+    frexp(scaled.a[AXES_FREE + 2], &of_moments);
+    frexp(fmax(fabs(x[4]), fmax(fabs(x[5]), fabs(x[6]))), &scaled.exponent);
+    for (size_t i = AXES_FREE; i < AXES_FREE + 3; i++) scaled.a[i] = ldexp(scaled.a[i], -of_moments);
+    for (size_t i = 4; i < STATE_COUNT; i++) scaled.x[i] = ldexp(scaled.x[i], -scaled.exponent);
+    scaled.time = ldexp(time, scaled.exponent);
+    return scaled;
+}
+
+static double phase_of(Instance *instance, const Scaled *scaled) {
+    double phase;
+    instance->arg[0] = scaled->x;
+    instance->arg[1] = scaled->a;
+    instance->arg[2] = &scaled->time;
+    instance->res[0] = &phase;
+    free_phase(instance->arg, instance->res, instance->iw, instance->w, 0);
+    return phase;
+}
+
+static void follow(Instance *instance, const Scaled *scaled, int doublings, double next[]) {
+    double v[2][FREE_VARYING], k[FREE_CONSTANT];
+    const double share = ldexp(1.0, -doublings);
+    instance->arg[0] = scaled->x;
+    instance->arg[1] = scaled->a;
+    instance->arg[2] = &scaled->time;
+    instance->arg[3] = &share;
+    instance->res[0] = v[0];
+    instance->res[1] = k;
+    free_start(instance->arg, instance->res, instance->iw, instance->w, 0);
+    instance->arg[1] = k;
+    for (int i = 0; i < doublings; i++) {
+        instance->arg[0] = v[i % 2];
+        instance->res[0] = v[(i + 1) % 2];
+        free_double(instance->arg, instance->res, instance->iw, instance->w, 0);
+    }
+    instance->arg[0] = scaled->x;
+    instance->arg[1] = scaled->a;
+    instance->arg[3] = v[doublings % 2];
+    instance->arg[4] = k;
+    instance->res[0] = next;
+    free_finish(instance->arg, instance->res, instance->iw, instance->w, 0);
+    for (size_t i = 4; i < STATE_COUNT; i++) next[i] = ldexp(next[i], scaled->exponent);
+}
+
+/* Whether a rate is so small beside the others that the product of two such is no double. */
+static bool has_tiny_rate(const Scaled *scaled) {
+    bool tiny = false;
+    for (size_t i = 4; i < STATE_COUNT; i++) tiny = tiny || (scaled->x[i] != 0.0 && fabs(scaled->x[i]) < TINY);
+    return tiny;
+}
+
+/* One piece of free motion, *time [s] or less: what is left of it is *time. */
+static Status free_piece(Instance *instance, double x[], double *time, bool whole) {
+    Scaled scaled = scale(instance, x, *time);
+    double phase = phase_of(instance, &scaled), taken = *time, next[STATE_COUNT];
+    if (!whole && phase > LONGEST_TINY && has_tiny_rate(&scaled)) {
+        taken = *time * (LONGEST_TINY / phase);
+        scaled = scale(instance, x, taken);
+        phase = phase_of(instance, &scaled);
+    }
+    int doublings = 0;
+    if (!(phase <= FIRST_ANGLE)) frexp(phase / FIRST_ANGLE, &doublings);
+    if (!isfinite(phase) || !isfinite(scaled.time) || doublings > MOST_DOUBLINGS)
+        return instance_refuse(instance,
+                               "free motion over %.10g s with angular_velocity = (%.10g, %.10g, %.10g) rad/s: it can be "
+                               "followed for about %.2g rad",
+                               *time, x[4], x[5], x[6], ldexp(FIRST_ANGLE, MOST_DOUBLINGS));
+    follow(instance, &scaled, doublings, next);
+    for (size_t i = 0; i < STATE_COUNT; i++)
+        if (!isfinite(next[i]))
+            return instance_refuse(instance,
+                                   "free motion over %.10g s from angular_velocity = (%.10g, %.10g, %.10g) rad/s leaves "
+                                   "the range of finite numbers",
+                                   *time, x[4], x[5], x[6]);
+    memcpy(x, next, sizeof next);
+    *time -= taken;
+    return STATUS_OK;
+}
+
+Status free_motion(Instance *instance, const double x[], double time, double next[]) {
+    composite_refresh_axes(instance);
+    memcpy(next, x, STATE_COUNT * sizeof(double));
+    if (x[4] == 0.0 && x[5] == 0.0 && x[6] == 0.0) return STATUS_OK;
+    double left = time;
+    Status status = STATUS_OK;
+    for (int piece = 0; left != 0.0 && status == STATUS_OK; piece++)
+        status = free_piece(instance, next, &left, piece == MOST_PIECES);
+    return status;
+}
+
+#else
+
+/* C99 wants something to compile. */
+typedef int NothingFree;
+
+#endif

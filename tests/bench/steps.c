@@ -1,0 +1,101 @@
+/* Loads the library of an FMI 3.0 co-simulation FMU and times one communication step from the scene's start, again
+   and again from a saved state, beside a plain RK4 step.
+
+   steps LIBRARY TOKEN SIZE REPEATS TOLERANCE SET_COUNT REFERENCE VALUE ... GET_COUNT REFERENCE ...
+   Prints "nanoseconds ratio" of the step without the restoring, medians over short rounds, then the values got after
+   one step. */
+#include <dlfcn.h>
+
+#include "fmi3FunctionTypes.h"
+#include "plain.h"
+
+enum { ROUNDS = 101, MOST = 64, PLAIN_STEPS = 2000 };
+
+static void *look_up(void *library, const char *name) {
+    void *symbol = dlsym(library, name);
+    if (!symbol) {
+        fprintf(stderr, "%s: not found\n", name);
+        exit(1);
+    }
+    return symbol;
+}
+
+static void check(fmi3Status status, const char *what) {
+    if (status == fmi3OK) return;
+    fprintf(stderr, "%s: status %d\n", what, (int)status);
+    exit(1);
+}
+
+static void logged(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category, fmi3String message) {
+    (void)environment, (void)status, (void)category;
+    fprintf(stderr, "%s\n", message);
+}
+
+int main(int count, char **words) {
+    if (count < 8) return 2;
+    void *library = dlopen(words[1], RTLD_NOW);
+    if (!library) {
+        fprintf(stderr, "%s\n", dlerror());
+        return 1;
+    }
+    fmi3InstantiateCoSimulationTYPE *instantiate = look_up(library, "fmi3InstantiateCoSimulation");
+    fmi3EnterInitializationModeTYPE *enter = look_up(library, "fmi3EnterInitializationMode");
+    fmi3ExitInitializationModeTYPE *leave = look_up(library, "fmi3ExitInitializationMode");
+    fmi3SetFloat64TYPE *set_values = look_up(library, "fmi3SetFloat64");
+    fmi3GetFloat64TYPE *get_values = look_up(library, "fmi3GetFloat64");
+    fmi3DoStepTYPE *do_step = look_up(library, "fmi3DoStep");
+    fmi3GetFMUStateTYPE *save = look_up(library, "fmi3GetFMUState");
+    fmi3SetFMUStateTYPE *restore = look_up(library, "fmi3SetFMUState");
+    const double size = strtod(words[3], NULL), tolerance = strtod(words[5], NULL);
+    const long repeats = strtol(words[4], NULL, 10);
+    fmi3Instance f = instantiate("timed", words[2], NULL, false, true, false, false, NULL, 0, NULL, logged, NULL);
+    if (!f) return 1;
+    check(enter(f, tolerance > 0.0, tolerance, 0.0, false, 0.0), "enter");
+    check(leave(f), "leave");
+    char **word = words + 6;
+    for (long n = strtol(*word++, NULL, 10); n > 0; n--) {
+        const fmi3ValueReference reference = (fmi3ValueReference)strtoul(*word++, NULL, 10);
+        const double value = strtod(*word++, NULL);
+        check(set_values(f, &reference, 1, &value, 1), "set");
+    }
+    fmi3Boolean event, terminate, early;
+    double last, sink = 0.0, values[MOST];
+    fmi3FMUState start = NULL;
+    static double restoring[ROUNDS], taken[ROUNDS], ratio[ROUNDS];
+    check(do_step(f, 0.0, size, true, &event, &terminate, &early, &last), "step");
+    fmi3ValueReference got[MOST];
+    const size_t get_count = (size_t)strtoul(*word++, NULL, 10);
+    for (size_t i = 0; i < get_count && i < MOST; i++) got[i] = (fmi3ValueReference)strtoul(*word++, NULL, 10);
+    check(get_values(f, got, get_count, values, get_count), "get");
+    /* The state to come back to is one at time 0 whose principal axes have been found. */
+    fmi3ResetTYPE *reset = look_up(library, "fmi3Reset");
+    check(reset(f), "reset");
+    check(enter(f, tolerance > 0.0, tolerance, 0.0, false, 0.0), "enter");
+    check(leave(f), "leave");
+    word = words + 6;
+    for (long n = strtol(*word++, NULL, 10); n > 0; n--) {
+        const fmi3ValueReference reference = (fmi3ValueReference)strtoul(*word++, NULL, 10);
+        const double value = strtod(*word++, NULL);
+        check(set_values(f, &reference, 1, &value, 1), "set");
+    }
+    double all[MOST];
+    check(get_values(f, got, get_count, all, get_count), "get");
+    check(save(f, &start), "save");
+    for (int round = 0; round < ROUNDS; round++) {
+        const double plain = time_plain(PLAIN_STEPS, &sink);
+        double begun = now();
+        for (long i = 0; i < repeats; i++) check(restore(f, start), "restore");
+        restoring[round] = 1e9 * (now() - begun) / (double)repeats;
+        begun = now();
+        for (long i = 0; i < repeats; i++) {
+            check(restore(f, start), "restore");
+            check(do_step(f, 0.0, size, true, &event, &terminate, &early, &last), "step");
+        }
+        taken[round] = 1e9 * (now() - begun) / (double)repeats - restoring[round];
+        ratio[round] = taken[round] / plain;
+    }
+    printf("%.2f %.3f", median(taken, ROUNDS), median(ratio, ROUNDS));
+    for (size_t i = 0; i < get_count; i++) printf(" %.17g", values[i]);
+    printf("\n");
+    return isfinite(sink) ? 0 : 1;
+}
