@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: run test check platforms robustness bench clean
+.PHONY: run test check platforms robustness stability bench peers clean
 
 run: .venv/installed
 	$(BIN)/python -m fmu_build examples/iss_dg.toml -o build/iss_dg.fmu
@@ -22,12 +22,19 @@ platforms: .venv/installed-dev
 robustness: .venv/installed-dev
 	$(BIN)/python -m pytest -m robustness tests/robustness
 
+stability: .venv/installed-dev
+	$(BIN)/python -m pytest -m stability tests/stability
+	cd tests && ../$(BIN)/python -m stability.table
+
 bench: .venv/installed-dev
 	$(BIN)/python tests/bench/run.py
 	$(BIN)/python tests/bench/propagators.py
 
+peers: .venv-peers/installed
+	PYTHONPATH=tests .venv-peers/bin/python tests/peers/peers.py
+
 clean:
-	rm -rf .venv build .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-peers build .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 .venv/installed: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -40,4 +47,12 @@ clean:
 
 .venv/installed-dev: .venv/installed
 	$(BIN)/python -m pip install --quiet --group dev
+	touch $@
+
+.venv-peers/installed: pyproject.toml
+	$(PYTHON) -m venv .venv-peers
+	.venv-peers/bin/python -m pip install --quiet --upgrade 'pip>=25.1'
+	.venv-peers/bin/python -m pip install --quiet --editable . scipy mpmath
+	@for p in mujoco drake bsk; do .venv-peers/bin/python -m pip install --quiet $$p || \
+	  echo "$$p cannot be installed here: skipped"; done
 	touch $@

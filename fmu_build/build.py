@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fmu_build.codegen import digest, model_source, scene_header, scene_source
-from fmu_build.compiler import compile_binaries
+from fmu_build.compiler import compile_binaries, compiler_cache
 from fmu_build.documentation import documentation
 from fmu_build.errors import BuildError
 from fmu_build.model_description import model_description
@@ -88,17 +88,35 @@ def compile_sources(
     identifier : the FMU's modelIdentifier
     Raises BuildError if the compiler fails, or if there is no room for what it makes.
     """
+    whole = "".join(f'#include "sources/{name}"\n' for name in names)
     try:
-        with tempfile.TemporaryDirectory(prefix="supervessel-") as folder:
-            for path, text in packed.items():
-                file = Path(folder, path)
-                file.parent.mkdir(exist_ok=True)
-                file.write_bytes(text)
-            whole = "".join(f'#include "sources/{name}"\n' for name in names)
-            Path(folder, WHOLE).write_text(whole, encoding="utf-8")
-            return compile_binaries([WHOLE], Path(folder), platforms, fmi, identifier)
+        folder = _kept({**packed, WHOLE: whole.encode()})
+        return compile_binaries([WHOLE], folder, platforms, fmi, identifier)
     except OSError as error:
-        raise BuildError(f"{tempfile.gettempdir()}: no room to compile in: {error.strerror}") from None
+        raise BuildError(f"{error.filename}: no room to compile in: {error.strerror}") from None
+
+
+def _kept(files: Mapping[str, bytes]) -> Path:
+    """Returns a folder in the compiler's cache with these files, by path.
+
+    The same files are in the same folder again: only then does the compiler know what it has built.
+    """
+    kept = compiler_cache() / "sources"
+    folder = kept / digest(*(part for path, text in sorted(files.items()) for part in (path, text))).strip(
+        "{}"
+    )
+    if folder.is_dir():
+        return folder
+    kept.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=kept) as name:
+        part = Path(name, "whole")
+        for path, text in files.items():
+            file = part / path
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(text)
+        if not folder.is_dir():  # another process may have been faster
+            part.replace(folder)
+    return folder
 
 
 def _check_output(output: Path) -> None:

@@ -12,7 +12,7 @@ import casadi as ca
 from fmu_build.errors import BuildError
 from fmu_build.table import Entry
 from supervessel.equations import Equations, composite_slices
-from supervessel.propagators.exact import FIRST_ANGLE
+from supervessel.propagators.free_motion import FIRST_ANGLE
 from supervessel.scene import Scene
 
 CHOICES = {
@@ -75,7 +75,8 @@ def scene_header(scene: Scene, model: Equations, entries: Sequence[Entry]) -> st
         "REFERENCE_DERIVATIVES": references["der(state.attitude[1])"],
         "STATE_COUNT": len(model.x_names),
         "COMPOSITE_COUNT": model.composite.numel_out(0),
-        "AXES_FREE": model.axes_slices["free"].start if "free" in model.axes_slices else 0,
+        "AXES_FREE": model.axes_slices.get("free", slice(0)).start or 0,
+        "AXES_SERIES": model.axes_slices.get("series", slice(0)).start or 0,
         "FREE_VARYING": begun[0].numel_out(0) if begun else 0,
         "FREE_CONSTANT": begun[0].numel_out(1) if begun else 0,
         "COMPOSITE_MASS": where["mass"].start,

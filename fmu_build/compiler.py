@@ -39,7 +39,7 @@ def compile_binaries(
     """Compiles an FMU's library for each platform and returns the libraries by archive path, binaries/...
 
     sources : C files, relative to `folder`, their headers beside them
-    folder  : where they lie, and where the compiler may write
+    folder  : where they lie
     Raises BuildError with the compiler's own words for each platform where it fails.
     """
     contents = library_contents(platforms, fmi)
@@ -59,10 +59,10 @@ def _thin_libraries(
     """Returns the library of each platform; those that fail are all named in one BuildError."""
 
     def compiled(platform: Platform) -> bytes:
-        library = Path("binaries", platform.name, f"{model_identifier}{platform.suffix}")
-        (folder / library).parent.mkdir(parents=True, exist_ok=True)
-        compile_library([Path(name) for name in sources], platform, library, folder=folder)
-        return (folder / library).read_bytes()
+        with tempfile.TemporaryDirectory(prefix="supervessel-") as made:
+            library = Path(made, f"{model_identifier}{platform.suffix}")
+            compile_library([Path(name) for name in sources], platform, library, folder=folder)
+            return library.read_bytes()
 
     libraries, problems = {}, []
     with ThreadPoolExecutor(AT_ONCE) as pool:
@@ -86,8 +86,7 @@ def compile_library(
     """Compiles C sources into the shared library `output`.
 
     sources : C files, their headers beside them
-    folder  : what relative paths are relative to, by default the working folder. With relative paths the
-              compiler knows again what it has compiled in another temporary folder.
+    folder  : what relative paths are relative to, by default the working folder
     Raises BuildError with the compiler's own words if it fails, or if it does not end in half an hour.
     """
     command = [sys.executable, "-m", "ziglang", "cc", "-target", platform.target, *flags]

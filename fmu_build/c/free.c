@@ -13,8 +13,8 @@ enum { MOST_DOUBLINGS = 33 };
 /* A tumble from a spin about the middle axis grows by a factor e per radian of phase at most. A rate that is tiny beside
    the others is followed in pieces of LONGEST_TINY until it is not, or for so many pieces that it never will be. */
 static const double TINY = 0x1p-400;
-static const double LONGEST_TINY = 128.0; /* rad */
-enum { MOST_PIECES = 8 };
+static const double LONGEST_TINY = 16.0; /* rad */
+enum { MOST_PIECES = 48 };
 
 /* The state and the free part of a, scaled by powers of two so that rates and moments are about 1; the time then is
    about the angle turned. */

@@ -134,6 +134,7 @@ Status instance_set_experiment(Instance *instance, bool tolerance_defined, doubl
     if (stop_time_defined && !(stop_time >= start_time))
         return instance_error(instance, "stopTime = %.10g s: must not be before startTime = %.10g s", stop_time,
                               start_time);
+    tolerance_defined = tolerance_defined && STEPS >= STEPS_BY_ERROR && !instance->now.model_exchange;
     if (tolerance_defined && !(tolerance >= LEAST_TOLERANCE && tolerance <= LARGEST_TOLERANCE))
         return instance_error(instance, "tolerance = %.10g: must be from %g to %g", tolerance, LEAST_TOLERANCE,
                               LARGEST_TOLERANCE);

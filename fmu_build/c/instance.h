@@ -65,7 +65,7 @@ typedef struct {
     double error_estimate;            /* rad, of the last communication step */
     double p[INPUT_P_COUNT + 1];      /* the composite's inputs, directions scaled; + 1: may be none */
     double c[COMPOSITE_COUNT];        /* the composite of p */
-    double a[AXES_COUNT + 1];         /* moments and axes of c */
+    double a[AXES_COUNT + 1];         /* moments, axes and the like of c */
     double stepped_p[INPUT_P_COUNT + 1]; /* p of the last communication step, at first of the start */
     double epoch[STATE_COUNT];        /* the state that free motion is counted from */
     double elapsed, elapsed_rest;     /* s since then, as an unevaluated sum */

@@ -19,7 +19,7 @@ int response_reverse(const double **arg, double **res, int *iw, double *w, int m
 /* Of these a scene has those that its propagator uses. */
 int fastest_square(const double **arg, double **res, int *iw, double *w, int mem);    /* x, u, c -> rad2/s2 */
 int step(const double **arg, double **res, int *iw, double *w, int mem);              /* x, u, c, h -> x, error */
-int series(const double **arg, double **res, int *iw, double *w, int mem);            /* u, c -> rad/s2, map */
+int by_torque(const double **arg, double **res, int *iw, double *w, int mem);         /* u, c -> rad/s2 */
 int free_phase(const double **arg, double **res, int *iw, double *w, int mem);        /* x, a, t -> rad */
 int free_start(const double **arg, double **res, int *iw, double *w, int mem);        /* x, a, t, share -> v, k */
 int free_double(const double **arg, double **res, int *iw, double *w, int mem);       /* v, k -> v */

@@ -12,7 +12,23 @@ static const double MOST_SUB_STEPS = 1e7;
 static const double MOST_SUB_STEPS = 1e6; /* of about ten times the work */
 #endif
 
+#if FREE == FREE_ALWAYS || FREE == FREE_WHILE_FREE
+static const double LARGEST_TURN = 2e9; /* rad */
+#endif
+
 static const double HALF_ULP = 0.5 * DBL_EPSILON;
+
+#if STEPS != STEPS_BY_ANGLE
+
+/* Without overflow. */
+static double length_of(const double v[3]) {
+    const double length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    if (length <= DBL_MAX) return length;
+    const double a = v[0] * 0x1p-600, b = v[1] * 0x1p-600, c = v[2] * 0x1p-600;
+    return sqrt(a * a + b * b + c * c) * 0x1p600;
+}
+
+#endif
 
 static double larger(double a, double b) {
     return a > b ? a : b;
@@ -101,10 +117,6 @@ static Status sub_step(Instance *instance, Progress *progress) {
 
 #elif STEPS != STEPS_NONE
 
-static double length_of(const double v[3]) {
-    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-}
-
 #if STEPS == STEPS_BY_SERIES
 
 /* Of the series: 1 - ln(tolerance)/2 costs least; see supervessel/propagators/taylor.py. */
@@ -120,13 +132,14 @@ static double error_exponent(const Instance *instance) {
 
 /* From x by size [s] to next; error: estimates of the attitude's [rad] and the rate's [rad/s]. */
 static Status take_step(Instance *instance, double size, double next[], double error[2]) {
-    double acceleration[3], map[3 * PRODUCT_COUNT + 1];
+    double acceleration[3];
+    composite_refresh_axes(instance);
     instance->arg[0] = &instance->now.values[REFERENCE_TORQUE];
     instance->arg[1] = instance->now.c;
     instance->res[0] = acceleration;
-    instance->res[1] = map;
-    series(instance->arg, instance->res, instance->iw, instance->w, 0);
-    taylor_step(instance_states(instance), acceleration, map, size, series_order(instance->now.tolerance), next, error);
+    by_torque(instance->arg, instance->res, instance->iw, instance->w, 0);
+    taylor_step(instance_states(instance), acceleration, &instance->now.a[AXES_SERIES], size,
+                series_order(instance->now.tolerance), next, error);
     return STATUS_OK;
 }
 
@@ -226,11 +239,19 @@ static bool is_free(const Instance *instance) {
     return zero;
 }
 
-/* Takes the whole step from where the motion became free, so that rounding does not pile up over steps. */
+/* Takes the whole step from where the motion became free, so that rounding does not pile up over steps; or, if that is
+   too many turns away, from now on. */
 static Status free_step(Instance *instance, Progress *progress) {
     Dynamics *now = &instance->now;
     double *x = instance_states(instance), next[STATE_COUNT], elapsed = progress->h, rest = 0.0;
-    const bool goes_on = now->epoch_holds && !progress->composite_changed;
+    const double speed = length_of(x + 4);
+    if (!(speed * progress->h <= LARGEST_TURN))
+        return instance_refuse(instance,
+                               "communicationStepSize = %.10g s: turns the body by %.3g rad with angular_velocity = "
+                               "(%.10g, %.10g, %.10g) rad/s; free motion is followed for %g rad in a step",
+                               progress->h, speed * progress->h, x[4], x[5], x[6], LARGEST_TURN);
+    const bool goes_on = now->epoch_holds && !progress->composite_changed &&
+                         speed * (now->elapsed + progress->h) <= LARGEST_TURN;
     if (goes_on) { /* Knuth's sum: elapsed and rest together are exact */
         elapsed = now->elapsed + progress->h;
         const double added = elapsed - now->elapsed;
@@ -242,7 +263,7 @@ static Status free_step(Instance *instance, Progress *progress) {
     now->elapsed = elapsed;
     now->elapsed_rest = rest;
     now->epoch_holds = true;
-    progress->error = 8.0 * HALF_ULP * (1.0 + progress->h * sqrt(x[4] * x[4] + x[5] * x[5] + x[6] * x[6]));
+    progress->error = 8.0 * HALF_ULP * (1.0 + speed * progress->h);
     memcpy(x, next, sizeof next);
     progress->remaining = 0.0;
     return STATUS_OK;
@@ -290,7 +311,7 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
     Progress progress = {h, h, 0.0, 0.0, 0.0, false, false};
     progress.composite_changed = memcmp(now->p, now->stepped_p, sizeof now->p) != 0;
     double start[STATE_COUNT], end = time + h;
-    const double start_time = now->values[REFERENCE_TIME];
+    const double start_time = now->values[REFERENCE_TIME], start_error = now->error_estimate;
     memcpy(start, instance_states(instance), sizeof start);
     const Call *call = instance->call;
     while (progress.remaining > 0.0) {
@@ -300,9 +321,11 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
         if (status != STATUS_OK) {
             memcpy(instance_states(instance), start, sizeof start);
             now->values[REFERENCE_TIME] = start_time;
+            now->error_estimate = start_error;
             return status;
         }
         now->values[REFERENCE_TIME] = progress.remaining > 0.0 ? end - progress.remaining : end;
+        now->error_estimate = progress.error;
         if (!instance->sub_step_ended) continue;
         const double wanted = listen(instance, end);
         if (now->state == TERMINATED) return STATUS_ERROR;
@@ -312,8 +335,6 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
             progress.remaining = end - now->values[REFERENCE_TIME];
         }
     }
-    now->error_estimate = progress.error;
-    instance->outputs_are_current = false; /* a listener may have had them computed */
     now->epoch_holds = progress.was_free;
     memcpy(now->stepped_p, now->p, sizeof now->p);
     return STATUS_OK;

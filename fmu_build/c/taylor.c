@@ -15,12 +15,6 @@ static double remainder_of(double before, double after) {
     return after / sqrt(before > 0.0 ? before : 1.0);
 }
 
-static double square_of(const double values[], int count) {
-    double sum = 0.0;
-    for (int i = 0; i < count; i++) sum += values[i] * values[i];
-    return sum;
-}
-
 #if PRODUCT_COUNT > 0
 
 /* Coefficient k of the product of two rates; even and odd terms have a sum of their own. */
@@ -118,11 +112,17 @@ void taylor_step(const double x[7], const double acceleration[3], const double m
         x[2] + (x[0] * c + x[2] * a + (x[3] * b - x[1] * d)),
         x[3] + (x[0] * d + x[3] * a + (x[1] * c - x[2] * b)),
     };
-    const double length = sqrt(square_of(q, 4));
+    const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     for (int i = 0; i < 4; i++) next[i] = q[i] / length;
     for (int i = 0; i < 3; i++) next[4 + i] = x[4 + i] + gained[i];
-    error[0] = 2.0 * remainder_of(square_of(turn[order - 4], 8), square_of(turn[order - 2], 8));
-    error[1] = remainder_of(square_of(rates[order - 3], 6), square_of(rates[order - 1], 6));
+    double before[2] = {0.0, 0.0}, after[2] = {0.0, 0.0};
+    for (int k = order - 4; k < order; k++) {
+        double *squares = k < order - 2 ? before : after;
+        for (int i = 0; i < 4; i++) squares[0] += turn[k][i] * turn[k][i];
+        for (int i = 0; i < 3; i++) squares[1] += rates[k + 1][i] * rates[k + 1][i];
+    }
+    error[0] = 2.0 * remainder_of(before[0], after[0]);
+    error[1] = remainder_of(before[1], after[1]);
 }
 
 #else

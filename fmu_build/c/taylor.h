@@ -1,5 +1,4 @@
-/* A Taylor step by loops: what supervessel/propagators/taylor.py unrolls for the twin, operation by operation, so that
-   both give the same bits. Loops, because the unrolled code of order 12 and more is half as fast: it outgrows the
+/* A Taylor step by loops: what supervessel/propagators/taylor.py unrolls for the twin, operation by operation. Loops, because the unrolled code of order 12 and more is half as fast: it outgrows the
    instruction cache. */
 #ifndef TAYLOR_H
 #define TAYLOR_H

@@ -46,8 +46,10 @@ def rotation_matrix(attitude: ca.SX) -> ca.SX:
     """Returns R_inertial_body, (3, 3), of a unit quaternion, (4,)."""
     w, x, y, z = ca.vertsplit(attitude)
     X, Y, Z = 2.0 * x, 2.0 * y, 2.0 * z
-    return ca.vertcat(
-        ca.horzcat(1.0 - (y * Y + z * Z), x * Y - w * Z, x * Z + w * Y),
-        ca.horzcat(x * Y + w * Z, 1.0 - (x * X + z * Z), y * Z - w * X),
-        ca.horzcat(x * Z - w * Y, y * Z + w * X, 1.0 - (x * X + y * Y)),
+    ww, xx, yy, zz = w * w, x * x, y * y, z * z
+    per = 1.0 / ((ww + xx) + (yy + zz))
+    return per * ca.vertcat(
+        ca.horzcat((ww + xx) - (yy + zz), x * Y - w * Z, x * Z + w * Y),
+        ca.horzcat(x * Y + w * Z, (ww + yy) - (xx + zz), y * Z - w * X),
+        ca.horzcat(x * Z - w * Y, y * Z + w * X, (ww + zz) - (xx + yy)),
     )

@@ -22,10 +22,10 @@ from supervessel.inertia import from_upper_triangle, ldl, upper_triangle
 from supervessel.principal import principal, principal_forward, quaternion
 from supervessel.propagators import PROPAGATORS, Plan, plan_of
 from supervessel.propagators.bound import fastest_square
-from supervessel.propagators.free import free_functions
+from supervessel.propagators.exact import free_functions
 from supervessel.propagators.method import Motion
 from supervessel.quantities import EPSILON
-from supervessel.rotation import LAWS
+from supervessel.rotation import LAWS, turned_products
 from supervessel.scene import Scene
 from supervessel.variables import input_variables, output_variables, state_variables
 
@@ -50,23 +50,21 @@ takes from it is divided by that row's own pivot d_2.
 
 PRINCIPAL_OUTPUTS = frozenset({"principal_moments", "principal_axes"})
 
-AXES_SIZE = 7
-"""Length of each part of a: three moments, ascending, and the quaternion from principal to body axes."""
-
 
 @dataclass(frozen=True)
 class Equations:
     """Functions and names of one scene.
 
     composite    : p -> c
-    axes         : c -> a; "principal" of the composite for outputs, "free" of what the law turns freely
+    axes         : c -> a; "principal" of the composite for outputs, "free" of what the law turns freely:
+                   three moments each, ascending, and axes: quaternion (4,) or matrix, column by column, (9,);
+                   "series", the law's map of the products of two rates, (3, n) column by column
     ode          : x, u, c -> rate of x
     outputs      : x, u, c, a, e -> the outputs y, in the scene's order; e is the last step's error estimate
     fastest_square : x, u, c -> square [rad2/s2] of the fastest rate while turning by the scene's angle
     step         : x, u, c, h -> x after one sub-step of h [s]; a second result is its estimated error, (2,),
                    if the scene's method steps by it or the scene asks for it
-    series       : u, c -> what Taylor steps are made from in C: acceleration by torque, (3,), and the map of
-                   the products of two rates, (3, n)
+    by_torque    : u, c -> what the torque alone gives, (3,) [rad/s2], for the Taylor steps of C
     free_...     : exact free motion of length t [s] from x, see `propagators.exact`; with C's loop between
                    start and finish
     propagation  : those of them that the scene's co-simulation uses
@@ -149,7 +147,8 @@ def equations(scene: Scene) -> Equations:
         acceleration = law.acceleration(parts["law"], state[4:], torque)
         return ca.vertcat(attitude_dot(state[:4], state[4:]), acceleration)
 
-    slices, a_of_c = _axes(scene, plan, inertia)
+    products = _without_zeros(law.gyroscopic(parts["law"]))
+    slices, a_of_c = _axes(scene, plan, inertia, products)
     a, e = ca.SX.sym("a", a_of_c.numel()), ca.SX.sym("e")
     by_torque = law.acceleration(parts["law"], ca.SX.zeros(3), torque)
     fastest = fastest_square(x[4:], by_torque, law.growth, scene.rotation.max_angle_step)
@@ -164,16 +163,13 @@ def equations(scene: Scene) -> Equations:
         ca.Function("fastest_square", args, [fastest], names, ["rate_square"]),
         ca.Function("step", [*args, h], results, [*names, "h"], ["x_next", "error"][: len(results)]),
     ]
-    products = _without_zeros(law.gyroscopic(parts["law"]))
-    series = ca.Function("series", [u, c], [by_torque, products], ["u", "c"], ["acceleration", "map"])
+    series = ca.Function("by_torque", [u, c], [by_torque], ["u", "c"], ["acceleration"])
     propagation = (
         {"angle": steps, "error": steps[1:], "series": [series]}[plan.method.control] if plan.method else []
     )
     if plan.free != "never":
         propagation += free_functions(a.numel(), slices["free"])
-    y = _outputs(
-        scene, x, parts, a[slices["principal"]] if "principal" in slices else ca.SX.zeros(AXES_SIZE), e
-    )
+    y = _outputs(scene, x, parts, a[slices["principal"]] if "principal" in slices else ca.SX.zeros(7), e)
     return Equations(
         composite=ca.Function("composite", [p], [c_of_p], ["p"], ["c"]),
         axes=ca.Function("axes", [c], [a_of_c], ["c"], ["a"]),
@@ -202,23 +198,25 @@ def _without_zeros(products: ca.SX) -> ca.SX:
     return ca.densify(ca.horzcat(*columns[:3]) if diagonal and columns else products)
 
 
-def _axes(scene: Scene, plan: Plan, inertia: ca.SX) -> tuple[dict[str, slice], ca.SX]:
+def _axes(scene: Scene, plan: Plan, inertia: ca.SX, products: ca.SX) -> tuple[dict[str, slice], ca.SX]:
     """Returns where the parts of a stand, and a as an expression of c; both empty where nobody needs them."""
-    wanted = {}
-    if not PRINCIPAL_OUTPUTS.isdisjoint(scene.outputs.names):
-        wanted["principal"] = inertia
+    rotation = scene.rotation
+    shown = not PRINCIPAL_OUTPUTS.isdisjoint(scene.outputs.names)
+    in_series = plan.method is not None and plan.method.control == "series"
+    turning = LAWS[rotation.law].turning(inertia)
+    moments, axes = principal(turning)
+    parts: dict[str, ca.SX] = {}
+    if shown:
+        own_moments, own_axes = (moments, axes) if rotation.law == "tensor" else principal(inertia)
+        parts["principal"] = ca.vertcat(own_moments, quaternion(own_axes))
     if plan.free != "never":
-        wanted["free"] = LAWS[scene.rotation.law].turning(inertia)
-    slices: dict[str, slice] = {}
-    found: list[ca.SX] = []
-    for name, tensor in wanted.items():
-        if found and scene.rotation.law == "tensor":  # it turns with the composite's own
-            slices[name] = slices["principal"]
-            continue
-        slices[name] = slice(AXES_SIZE * len(found), AXES_SIZE * (len(found) + 1))
-        moments, rotation = principal(tensor)
-        found.append(ca.vertcat(moments, quaternion(rotation)))
-    return slices, ca.densify(ca.vertcat(ca.SX(0, 1), *found))
+        parts["free"] = ca.vertcat(moments, ca.vec(axes))
+    if in_series:
+        parts["series"] = ca.vec(turned_products(moments, axes) if products.size2() > 3 else products)
+    slices, end = {}, 0
+    for name, part in parts.items():
+        slices[name] = slice(end, end := end + part.numel())
+    return slices, ca.densify(ca.vertcat(ca.SX(0, 1), *parts.values()))
 
 
 def _axes_change(inertia: ca.SX, c: ca.SX, a: ca.SX, slices: Mapping[str, slice]) -> tuple[ca.SX, ca.SX]:

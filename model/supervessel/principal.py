@@ -64,11 +64,10 @@ def quaternion(rotation: ca.SX) -> ca.SX:
 
     rotation : (3, 3), trace at least 0, as `principal` returns
     """
-    w = 0.5 * ca.sqrt(1.0 + ca.trace(rotation))
     axis = ca.vertcat(
         rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]
     )
-    return unit(ca.vertcat(w, axis * (0.25 / w)))
+    return unit(ca.vertcat(1.0 + ca.trace(rotation), axis))
 
 
 def principal_forward(moments: ca.SX, rotation: ca.SX, d_inertia: ca.SX) -> tuple[ca.SX, ca.SX]:

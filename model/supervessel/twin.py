@@ -1,6 +1,7 @@
 """The twin: the FMU's own equations as CasADi functions, for control design and estimation."""
 
 from functools import cached_property
+from typing import get_args
 
 import casadi as ca
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from supervessel.equations import Equations, composite_slices, equations, p_start, simplification
 from supervessel.inertia import from_upper_triangle
-from supervessel.propagators.free import free_step
+from supervessel.propagators.exact import free_step
 from supervessel.scene import Propagator, Scene
 
 GAP = 1e-8
@@ -25,14 +26,14 @@ class Twin:
 
     Each function's numbers are the FMU's to the last bit, for composite, ode, outputs but principal ones, and
     a single sub-step of "rk4", "dop853" and "taylor": both evaluate the same operations in the same order,
-    and only + - * / and the square root occur, which IEEE 754 rounds correctly everywhere. Free motion and
-    principal axes agree to a few u (1 + angle turned).
+    and only + - * / and the square root occur, which IEEE 754 rounds correctly everywhere. Taylor steps,
+    free motion and principal axes agree to a few u (1 + angle turned).
 
     composite    : p -> mass [kg], barycentre (3,) [m], inertia (3, 3) [kg m2], pmi (3,) [m2]
     ode          : x, u, p -> x_dot
     step         : x, u, p, h -> x_next, attitude at unit length, by one step of the scene's propagator; of
                    "auto" by the method that it takes with torque
-    longest_step : x, u, p -> h_max, the longest sub-step [s] that the FMU takes from x
+    longest_step : x, u, p -> h_max, the longest sub-step [s] that the FMU takes from x by "rk4"
     outputs      : x, u, p -> y, the FMU's outputs but error_estimate, which follows from a step
 
     Directions in p may have any length whose square a double holds. Nothing in p is checked: the FMU
@@ -41,7 +42,7 @@ class Twin:
     scene      : from `load_scene`
     propagator : "rk4" and so on, instead of the scene's
     doublings  : of free motion, "exact" and "split", in a step: room for a phase of FIRST_ANGLE 2^doublings,
-                 about the angle turned; where more is needed the step is NaN
+                 about the angle turned; where more is needed the step is NaN, as is "exact" with a torque
 
     Derivatives of a step are right wherever values are, with one exception: those of free motion by p need
     principal axes. They are off by about 1e-15/gap, relatively, gap being the least difference of principal
@@ -53,7 +54,11 @@ class Twin:
         x_next = twin.step(twin.x_start, [0, 0, 100], twin.p_start, 0.1)
     """
 
-    def __init__(self, scene: Scene, propagator: Propagator | None = None, doublings: int = 8) -> None:
+    def __init__(self, scene: Scene, *, propagator: Propagator | None = None, doublings: int = 8) -> None:
+        if propagator not in (None, *get_args(Propagator)):
+            raise ValueError(f"propagator = {propagator!r}: must be one of {', '.join(get_args(Propagator))}")
+        if not (isinstance(doublings, int) and 0 <= doublings <= 64):
+            raise ValueError(f"doublings = {doublings!r}: must be a whole number from 0 to 64")
         if propagator is not None:
             rotation = scene.rotation.model_copy(update={"propagator": propagator})
             scene = scene.model_copy(update={"rotation": rotation})
@@ -99,14 +104,15 @@ class Twin:
 
         def free(x: ca.SX) -> ca.SX:
             axes = a[model.axes_slices["free"]]
-            end = free_step(x, axes[:3], axes[3:], self.h, self.doublings)
+            end = free_step(x, axes[:3], ca.reshape(axes[3:], 3, 3), self.h, self.doublings)
             return end + _zero_without_derivative_at_equal(axes[:3])
 
         def stepped(x: ca.SX) -> ca.SX:
             return model.step.call([x, self.u, c, self.h])[0]
 
         if model.plan.method is None:
-            return free(self.x)
+            pushed = ca.sumsqr(self.u) > 0.0 if self.u_names else ca.SX(0.0)
+            return free(self.x) + ca.if_else(pushed, ca.SX.nan(), 0.0)
         if model.plan.free == "between kicks":
             return stepped(free(stepped(self.x)))
         return stepped(self.x)

@@ -46,8 +46,8 @@ def raw_body(pmi: Any, rates: Any, torque: bool = True) -> dict[str, Any]:
 @pytest.mark.parametrize("rates", RATES.values(), ids=RATES)
 @pytest.mark.parametrize("pmi", MOMENTS.values(), ids=MOMENTS)
 def test_free_motion_has_the_derivatives_of_steps_by_state_and_time(pmi, rates):
-    truth = jacobians(Twin(scene(raw_body(pmi, rates)), "dop853"), STEPPED)
-    found = jacobians(Twin(scene(raw_body(pmi, rates, torque=False)), "exact"))
+    truth = jacobians(Twin(scene(raw_body(pmi, rates)), propagator="dop853"), STEPPED)
+    found = jacobians(Twin(scene(raw_body(pmi, rates, torque=False)), propagator="exact"))
     # `exact` states 1e-12 at such points; DOP853 at 0.1 rad a step is at rounding
     assert np.abs(found[0] - truth[0]).max() <= 2e-12 * np.abs(truth[0]).max()
     assert np.abs(found[3] - truth[3]).max() <= 2e-12
@@ -57,7 +57,7 @@ def test_free_motion_has_the_derivatives_of_steps_by_state_and_time(pmi, rates):
 @pytest.mark.parametrize("pmi", MOMENTS.values(), ids=MOMENTS)
 @pytest.mark.parametrize("propagator", ["rk4", "dop853", "taylor", "split"])
 def test_derivatives_by_torque_are_finite_and_those_of_small_torques(propagator, pmi, rates):
-    twin = Twin(scene(raw_body(pmi, rates)), propagator)
+    twin = Twin(scene(raw_body(pmi, rates)), propagator=propagator)
     _, by_torque, _, _ = jacobians(twin)
     torque = 1e-3  # N m, on 1000 kg m2: the change is linear to 1e-6 of itself
     for i, column in enumerate(by_torque.T):
@@ -85,8 +85,8 @@ def assembly(gap: float) -> dict[str, Any]:
 
 @pytest.mark.parametrize("gap", [1e-1, 1e-3, 1e-5, 4e-8])
 def test_derivatives_of_free_motion_by_inputs_lose_digits_as_stated(gap):
-    truth = jacobians(Twin(scene(assembly(gap)), "dop853"), STEPPED)[2]
-    found = jacobians(Twin(scene(assembly(gap)), "exact"))[2]
+    truth = jacobians(Twin(scene(assembly(gap)), propagator="dop853"), STEPPED)[2]
+    found = jacobians(Twin(scene(assembly(gap)), propagator="exact"))[2]
     size = np.abs(truth).max(axis=0)
     moved = size > 0.0
     error = np.abs(found - truth).max(axis=0)[moved] / size[moved]
@@ -97,7 +97,7 @@ def test_derivatives_of_free_motion_by_inputs_lose_digits_as_stated(gap):
 @pytest.mark.parametrize("pmi", [(1.0, 1.0, 1.5), (1.0, 1.5, 1.5), (1.0, 1.0 + 0.5 * GAP, 1.5)])
 def test_derivatives_of_free_motion_by_inputs_are_nan_where_axes_are_not_unique(pmi):
     raw = variant(raw_body(pmi, RATES["general"], torque=False), {"inputs.pmi": ["B"]})
-    twin = Twin(scene(raw), "exact")
+    twin = Twin(scene(raw), propagator="exact")
     by_state, _, by_inputs, by_time = jacobians(twin)
     assert np.isnan(by_inputs[:, 1:]).any()
     assert np.isfinite(by_state).all()
@@ -108,7 +108,7 @@ def test_derivatives_of_free_motion_by_inputs_are_nan_where_axes_are_not_unique(
 @pytest.mark.parametrize("pmi", MOMENTS.values(), ids=MOMENTS)
 def test_steps_that_need_no_axes_have_derivatives_by_inputs_everywhere(pmi):
     raw = variant(raw_body(pmi, RATES["general"], torque=False), {"inputs.pmi": ["B"]})
-    twin = Twin(scene(raw), "dop853")
+    twin = Twin(scene(raw), propagator="dop853")
     by_inputs = jacobians(twin)[2]
     for i, column in enumerate(by_inputs.T):
         p, change = twin.p_start, 1e-6 * abs(twin.p_start[i])

@@ -7,7 +7,7 @@ one is its file and its line in PROPAGATORS.
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from supervessel.propagators import dop853, free, rk4, split, taylor
+from supervessel.propagators import dop853, exact, rk4, split, taylor
 from supervessel.propagators.method import Propagator
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ PROPAGATORS: dict[str, Propagator] = {
     "rk4": rk4.PROPAGATOR,
     "dop853": dop853.PROPAGATOR,
     "taylor": taylor.PROPAGATOR,
-    "exact": free.PROPAGATOR,
+    "exact": exact.PROPAGATOR,
     "split": split.PROPAGATOR,
 }
 """The methods; "auto" is a plan made of them."""

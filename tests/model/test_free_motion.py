@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from supervessel.propagators import exact
+from supervessel.propagators import free_motion
 from support import EPS
 
 Array = NDArray[np.float64]
@@ -157,7 +157,7 @@ def units(truth: Truth, case: Case, varied: tuple[int, ...] = tuple(range(7))) -
 
 @cache
 def step(room: int = ROOM) -> ca.Function:
-    return ca.Function("step", [J, W, T], [ca.vertcat(*exact.free_turn(J, W, T, room))])
+    return ca.Function("step", [J, W, T], [ca.vertcat(*free_motion.free_turn(J, W, T, room))])
 
 
 def value(case: Case) -> Array:
@@ -167,7 +167,7 @@ def value(case: Case) -> Array:
 @cache
 def jacobian() -> ca.Function:
     """Returns the derivatives, (7, 7), by forward and by reverse differentiation."""
-    out = ca.vertcat(*exact.free_turn(J, W, T, 10))
+    out = ca.vertcat(*free_motion.free_turn(J, W, T, 10))
     forward = ca.horzcat(*(ca.jtimes(out, INPUTS, column) for column in ca.horzsplit(ca.SX.eye(7))))
     reverse = ca.horzcat(*(ca.jtimes(out, INPUTS, column, True) for column in ca.horzsplit(ca.SX.eye(7))))
     return ca.Function("jacobian", [J, W, T], [ca.jacobian(out, INPUTS), forward, reverse.T])
@@ -358,7 +358,7 @@ def test_phase_is_the_argument_of_the_jacobi_functions() -> None:
         double_energy, square = inertia @ np.array(w) ** 2, (inertia * w) @ (inertia * w)
         inner, outer = (0, 2) if square >= double_energy * inertia[1] else (2, 0)
         rate = (square - double_energy * inertia[inner]) * (inertia[outer] - inertia[1]) / inertia.prod()
-        phase = float(ca.Function("f", [], [exact.phase(*(ca.SX(x) for x in (moments, w, t)))])()["o0"])
+        phase = float(ca.Function("f", [], [free_motion.phase(*(ca.SX(x) for x in (moments, w, t)))])()["o0"])
         assert phase == pytest.approx(abs(t) * sqrt(rate), rel=1e-14)
 
 
@@ -371,20 +371,20 @@ def test_phase_is_the_argument_of_the_jacobi_functions() -> None:
     ],
 )
 def test_phase_is_zero_where_the_rates_do_not_change(case: Case) -> None:
-    assert float(ca.Function("f", [J, W, T], [exact.phase(J, W, T)])(*case)) == 0.0
+    assert float(ca.Function("f", [J, W, T], [free_motion.phase(J, W, T)])(*case)) == 0.0
 
 
 def test_a_loop_over_the_parts_agrees_with_the_composition() -> None:
     share = ca.SX.sym("share")
-    state = exact.start(J, W, T, share)
+    state = free_motion.start(J, W, T, share)
     s = ca.SX.sym("s", state.numel())
-    phase = ca.Function("phase", [J, W, T], [exact.phase(J, W, T)])
+    phase = ca.Function("phase", [J, W, T], [free_motion.phase(J, W, T)])
     start = ca.Function("start", [J, W, T, share], [state])
-    double = ca.Function("double", [s], [exact.double(s)])
-    finish = ca.Function("finish", [J, W, T, s], [ca.vertcat(*exact.finish(J, W, T, s))])
+    double = ca.Function("double", [s], [free_motion.double(s)])
+    finish = ca.Function("finish", [J, W, T, s], [ca.vertcat(*free_motion.finish(J, W, T, s))])
     for moments, rates in TRAVELLED:
         for span in (0.1, -3.0, 100.0):
-            angle = float(phase(moments, rates, span)) / exact.FIRST_ANGLE
+            angle = float(phase(moments, rates, span)) / free_motion.FIRST_ANGLE
             doublings = max(0, ceil(log2(angle)))
             x = start(moments, rates, span, 2.0**-doublings)
             for _ in range(doublings):
@@ -397,8 +397,8 @@ def test_a_loop_over_the_parts_agrees_with_the_composition() -> None:
 
 def test_too_few_doublings_give_no_number() -> None:
     few = step(2)
-    phase = ca.Function("phase", [J, W, T], [exact.phase(J, W, T)])
-    most = 4.0 * exact.FIRST_ANGLE / float(phase(GENERAL, RATES["general"], 1.0))
+    phase = ca.Function("phase", [J, W, T], [free_motion.phase(J, W, T)])
+    most = 4.0 * free_motion.FIRST_ANGLE / float(phase(GENERAL, RATES["general"], 1.0))
     assert np.isfinite(np.array(few(GENERAL, RATES["general"], 0.999 * most))).all()
     assert np.isnan(np.array(few(GENERAL, RATES["general"], 1.001 * most))).all()
 
@@ -478,15 +478,15 @@ def instructions(inputs: list[ca.SX], *results: ca.SX) -> Any:
 
 def test_cost_of_the_parts() -> None:
     share = ca.SX.sym("share")
-    state = exact.start(J, W, T, share)
+    state = free_motion.start(J, W, T, share)
     s = ca.SX.sym("s", state.numel())
-    ends = instructions([J, W, T, share], state) + instructions([J, W, T, s], *exact.finish(J, W, T, s))
+    ends = instructions([J, W, T, share], state) + instructions([J, W, T, s], *free_motion.finish(J, W, T, s))
     assert ends <= 6 * RK4_INSTRUCTIONS
-    assert instructions([s], exact.double(s)) <= 0.4 * RK4_INSTRUCTIONS
+    assert instructions([s], free_motion.double(s)) <= 0.4 * RK4_INSTRUCTIONS
 
 
 @pytest.mark.parametrize("room", [0, 4, 8, 20])
 def test_jacobian_costs_eight_values_at_the_most(room: int) -> None:
-    out = ca.vertcat(*exact.free_turn(J, W, T, room))
+    out = ca.vertcat(*free_motion.free_turn(J, W, T, room))
     together = instructions([J, W, T], out, ca.jacobian(out, ca.vertcat(W, T)))
     assert together <= 8 * instructions([J, W, T], out)
