@@ -63,6 +63,7 @@ typedef struct {
     double taken;        /* sub-steps, those that were taken again included */
     double error;        /* rad, estimated, at the step's end */
     double next_size;    /* s, of the next sub-step, where the error controls it; 0: not known */
+    int exponent;        /* power of a sub-step that its estimated error grows with, once next_size is known */
     bool composite_changed; /* since the last communication step */
     bool was_free;
 } Progress;
@@ -126,26 +127,26 @@ static int series_order(double tolerance) {
 }
 
 /* Power of the step that the estimated error grows with. */
-static double error_exponent(const Instance *instance) {
-    return series_order(instance->now.tolerance) + 1.0;
+static int error_exponent(const Instance *instance) {
+    return series_order(instance->now.tolerance) + 1;
 }
 
 /* From x by size [s] to next; error: estimates of the attitude's [rad] and the rate's [rad/s]. */
-static Status take_step(Instance *instance, double size, double next[], double error[2]) {
+static Status take_step(Instance *instance, int exponent, double size, double next[], double error[2]) {
     double acceleration[3];
     composite_refresh_axes(instance);
     instance->arg[0] = &instance->now.values[REFERENCE_TORQUE];
     instance->arg[1] = instance->now.c;
     instance->res[0] = acceleration;
     by_torque(instance->arg, instance->res, instance->iw, instance->w, 0);
-    taylor_step(instance_states(instance), acceleration, &instance->now.a[AXES_SERIES], size,
-                series_order(instance->now.tolerance), next, error);
+    taylor_step(instance_states(instance), acceleration, &instance->now.a[AXES_SERIES], size, exponent - 1, next,
+                error);
     return STATUS_OK;
 }
 
 #else
 
-static double error_exponent(const Instance *instance) {
+static int error_exponent(const Instance *instance) {
     (void)instance;
     return ERROR_EXPONENT;
 }
@@ -159,7 +160,8 @@ static void call_step(Instance *instance, const double x[], double size, double 
     step(instance->arg, instance->res, instance->iw, instance->w, 0);
 }
 
-static Status take_step(Instance *instance, double size, double next[], double error[2]) {
+static Status take_step(Instance *instance, int exponent, double size, double next[], double error[2]) {
+    (void)exponent;
     call_step(instance, instance_states(instance), size, next, error);
 #if FREE == FREE_BETWEEN_KICKS
     double kicked[STATE_COUNT], drifted[STATE_COUNT], again[2];
@@ -185,7 +187,7 @@ static double first_size(Instance *instance, const Progress *progress) {
     ode(instance->arg, instance->res, instance->iw, instance->w, 0);
     const double speed = length_of(instance_states(instance) + 4) + sqrt(length_of(rates + 4));
     if (speed * progress->h <= 0.02) return progress->h;
-    return 2.0 * pow(instance->now.tolerance, 1.0 / error_exponent(instance)) / speed;
+    return 2.0 * pow(instance->now.tolerance, 1.0 / progress->exponent) / speed;
 #endif
 }
 
@@ -194,8 +196,11 @@ static double first_size(Instance *instance, const Progress *progress) {
    the rate turns the body on for what remains, but counts no less than relative to the rate. */
 static Status sub_step(Instance *instance, Progress *progress) {
     double *x = instance_states(instance), next[STATE_COUNT], error[2];
-    const double tolerance = instance->now.tolerance, power = 1.0 / (error_exponent(instance) - 1.0);
-    if (progress->next_size == 0.0) progress->next_size = first_size(instance, progress);
+    if (progress->next_size == 0.0) {
+        progress->exponent = error_exponent(instance);
+        progress->next_size = first_size(instance, progress);
+    }
+    const double tolerance = instance->now.tolerance, power = 1.0 / (progress->exponent - 1.0);
     for (;;) {
         double size = progress->next_size;
         if (!(size < progress->remaining)) size = progress->remaining;
@@ -209,7 +214,7 @@ static Status sub_step(Instance *instance, Progress *progress) {
                                    "are taken",
                                    progress->h, count, tolerance, x[4], x[5], x[6], progress->remaining,
                                    MOST_SUB_STEPS);
-        const Status status = take_step(instance, size, next, error);
+        const Status status = take_step(instance, progress->exponent, size, next, error);
         if (status != STATUS_OK) return status;
         const double speed = larger(length_of(x + 4), length_of(next + 4));
         const double reach = larger(progress->remaining, speed > 0.0 ? 1.0 / speed : 0.0);
@@ -308,7 +313,7 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
     Status status = check_times(instance, time, h);
     if (status == STATUS_OK) status = composite_refresh(instance);
     if (status != STATUS_OK) return status;
-    Progress progress = {h, h, 0.0, 0.0, 0.0, false, false};
+    Progress progress = {h, h, 0.0, 0.0, 0.0, 0, false, false};
     progress.composite_changed = memcmp(now->p, now->stepped_p, sizeof now->p) != 0;
     double start[STATE_COUNT], end = time + h;
     const double start_time = now->values[REFERENCE_TIME], start_error = now->error_estimate;

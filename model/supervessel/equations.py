@@ -203,16 +203,17 @@ def _axes(scene: Scene, plan: Plan, inertia: ca.SX, products: ca.SX) -> tuple[di
     rotation = scene.rotation
     shown = not PRINCIPAL_OUTPUTS.isdisjoint(scene.outputs.names)
     in_series = plan.method is not None and plan.method.control == "series"
-    turning = LAWS[rotation.law].turning(inertia)
-    moments, axes = principal(turning)
+    mapped = in_series and products.size2() > 3
     parts: dict[str, ca.SX] = {}
+    if plan.free != "never" or mapped or (shown and rotation.law == "tensor"):
+        moments, axes = principal(LAWS[rotation.law].turning(inertia))
     if shown:
         own_moments, own_axes = (moments, axes) if rotation.law == "tensor" else principal(inertia)
         parts["principal"] = ca.vertcat(own_moments, quaternion(own_axes))
     if plan.free != "never":
         parts["free"] = ca.vertcat(moments, ca.vec(axes))
     if in_series:
-        parts["series"] = ca.vec(turned_products(moments, axes) if products.size2() > 3 else products)
+        parts["series"] = ca.vec(turned_products(moments, axes) if mapped else products)
     slices, end = {}, 0
     for name, part in parts.items():
         slices[name] = slice(end, end := end + part.numel())
