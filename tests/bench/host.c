@@ -4,32 +4,16 @@
    Sets the given inputs to slowly changing values around their start values, steps by 1 ms, gets the given outputs.
    Prints lines "name nanoseconds ratio": the median over short rounds, each of which times the plain step as well;
    the ratio is to that. */
-#include <dlfcn.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "fmi3FunctionTypes.h"
+#include "library.h"
 #include "plain.h"
 
 enum { MOST = 4096, ROUNDS = 201 };
 
 static const double STEP_SIZE = 1e-3;
-
-static void *look_up(void *library, const char *name) {
-    void *symbol = dlsym(library, name);
-    if (!symbol) {
-        fprintf(stderr, "%s: not found\n", name);
-        exit(1);
-    }
-    return symbol;
-}
-
-static void check(fmi3Status status, const char *what) {
-    if (status == fmi3OK) return;
-    fprintf(stderr, "%s: status %d\n", what, (int)status);
-    exit(1);
-}
 
 static fmi3SetFloat64TYPE *set_values;
 static fmi3GetFloat64TYPE *get_values;
@@ -73,11 +57,7 @@ static size_t read_references(char **words, fmi3ValueReference references[MOST])
 
 int main(int count, char **words) {
     if (count < 6) return 2;
-    void *library = dlopen(words[1], RTLD_NOW);
-    if (!library) {
-        fprintf(stderr, "%s\n", dlerror());
-        return 1;
-    }
+    void *library = load(words[1]);
     fmi3InstantiateCoSimulationTYPE *instantiate = look_up(library, "fmi3InstantiateCoSimulation");
     fmi3EnterInitializationModeTYPE *enter = look_up(library, "fmi3EnterInitializationMode");
     fmi3ExitInitializationModeTYPE *leave = look_up(library, "fmi3ExitInitializationMode");

@@ -5,21 +5,19 @@ been found before. Quote the ratios: the speed of machines drifts.
 """
 
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from fmpy import extract, read_model_description
+from run import build_host
 from scipy.integrate import solve_ivp
 
 from fmu_build import build_fmu
-from fmu_build.compiler import FLAGS, fmi_headers
 from fmu_build.platforms import host_platform
 from supervessel import parse_scene, reference
 
-HERE = Path(__file__).parent
 RATES = (0.3, 0.7, 0.5)  # rad/s
 SPEED = float(np.linalg.norm(RATES))
 TORQUE = (0.01, -0.02, 0.015)  # N m
@@ -38,16 +36,6 @@ def scene(inertia: np.ndarray, **rotation: Any) -> dict[str, Any]:
         "rotation": {"angular_velocity": list(RATES), **rotation},
         "outputs": {"names": list(SHOWN)},
     }
-
-
-def build_host(name: str, folder: Path) -> Path:
-    """Returns a program of this folder, compiled with the FMU's own flags."""
-    host = folder / name
-    flags = [flag for flag in FLAGS if flag not in ("-std=c99", "-shared", "-fPIC", "-fvisibility=hidden")]
-    command = [sys.executable, "-m", "ziglang", "cc", "-target", host_platform().target, "-std=gnu99", *flags]
-    command += ["-isystem", str(fmi_headers()), str(HERE / f"{name}.c"), "-o", str(host), "-lm", "-ldl"]
-    subprocess.run(command, check=True)
-    return host
 
 
 class Body:

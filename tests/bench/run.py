@@ -31,12 +31,13 @@ MEANINGS = {
 }
 
 
-def build_host(folder: Path) -> Path:
-    """Returns the program that loads a library and times it, compiled with the FMU's own flags."""
-    host = folder / "host"
+def build_host(name: str, folder: Path) -> Path:
+    """Returns a program of this folder that loads a library, compiled with the FMU's own flags."""
+    host = folder / name
     flags = [flag for flag in FLAGS if flag not in ("-std=c99", "-shared", "-fPIC", "-fvisibility=hidden")]
     command = [sys.executable, "-m", "ziglang", "cc", "-target", host_platform().target, "-std=gnu99", *flags]
-    command += ["-isystem", str(fmi_headers()), str(HERE / "host.c"), "-o", str(host), "-lm", "-ldl"]
+    command += ["-isystem", str(fmi_headers()), f"-I{HERE.parent / 'support'}", str(HERE / f"{name}.c")]
+    command += ["-o", str(host), "-lm", "-ldl"]
     subprocess.run(command, check=True)
     return host
 
@@ -56,7 +57,7 @@ def main() -> None:
             read_model_description(str(fmu)),
         )
         library = unpacked / "binaries" / host_platform().name / f"iss_dg{host_platform().suffix}"
-        host = build_host(folder)
+        host = build_host("host", folder)
         references = {v.name: v.valueReference for v in description.modelVariables}
         by_causality = {
             causality: [v.name for v in description.modelVariables if v.causality == causality]

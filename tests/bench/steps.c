@@ -4,60 +4,39 @@
    steps LIBRARY TOKEN SIZE REPEATS TOLERANCE SET_COUNT REFERENCE VALUE ... GET_COUNT REFERENCE ...
    Prints "nanoseconds ratio" of the step without the restoring, medians over short rounds, then the values got after
    one step. */
-#include <dlfcn.h>
-
-#include "fmi3FunctionTypes.h"
+#include "library.h"
 #include "plain.h"
 
 enum { ROUNDS = 101, MOST = 64, PLAIN_STEPS = 2000 };
 
-static void *look_up(void *library, const char *name) {
-    void *symbol = dlsym(library, name);
-    if (!symbol) {
-        fprintf(stderr, "%s: not found\n", name);
-        exit(1);
+/* Initialises the instance and sets what the words say: SET_COUNT REFERENCE VALUE ... Returns the word after them. */
+static char **start_flight(void *library, fmi3Instance f, double tolerance, char **word) {
+    fmi3EnterInitializationModeTYPE *enter = look_up(library, "fmi3EnterInitializationMode");
+    fmi3ExitInitializationModeTYPE *leave = look_up(library, "fmi3ExitInitializationMode");
+    fmi3SetFloat64TYPE *set_values = look_up(library, "fmi3SetFloat64");
+    check(enter(f, tolerance > 0.0, tolerance, 0.0, false, 0.0), "enter");
+    check(leave(f), "leave");
+    for (long n = strtol(*word++, NULL, 10); n > 0; n--) {
+        const fmi3ValueReference reference = (fmi3ValueReference)strtoul(*word++, NULL, 10);
+        const double value = strtod(*word++, NULL);
+        check(set_values(f, &reference, 1, &value, 1), "set");
     }
-    return symbol;
-}
-
-static void check(fmi3Status status, const char *what) {
-    if (status == fmi3OK) return;
-    fprintf(stderr, "%s: status %d\n", what, (int)status);
-    exit(1);
-}
-
-static void logged(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category, fmi3String message) {
-    (void)environment, (void)status, (void)category;
-    fprintf(stderr, "%s\n", message);
+    return word;
 }
 
 int main(int count, char **words) {
     if (count < 8) return 2;
-    void *library = dlopen(words[1], RTLD_NOW);
-    if (!library) {
-        fprintf(stderr, "%s\n", dlerror());
-        return 1;
-    }
+    void *library = load(words[1]);
     fmi3InstantiateCoSimulationTYPE *instantiate = look_up(library, "fmi3InstantiateCoSimulation");
-    fmi3EnterInitializationModeTYPE *enter = look_up(library, "fmi3EnterInitializationMode");
-    fmi3ExitInitializationModeTYPE *leave = look_up(library, "fmi3ExitInitializationMode");
-    fmi3SetFloat64TYPE *set_values = look_up(library, "fmi3SetFloat64");
     fmi3GetFloat64TYPE *get_values = look_up(library, "fmi3GetFloat64");
     fmi3DoStepTYPE *do_step = look_up(library, "fmi3DoStep");
     fmi3GetFMUStateTYPE *save = look_up(library, "fmi3GetFMUState");
     fmi3SetFMUStateTYPE *restore = look_up(library, "fmi3SetFMUState");
     const double size = strtod(words[3], NULL), tolerance = strtod(words[5], NULL);
     const long repeats = strtol(words[4], NULL, 10);
-    fmi3Instance f = instantiate("timed", words[2], NULL, false, true, false, false, NULL, 0, NULL, logged, NULL);
+    fmi3Instance f = instantiate("timed", words[2], NULL, false, true, false, false, NULL, 0, NULL, log_message, NULL);
     if (!f) return 1;
-    check(enter(f, tolerance > 0.0, tolerance, 0.0, false, 0.0), "enter");
-    check(leave(f), "leave");
-    char **word = words + 6;
-    for (long n = strtol(*word++, NULL, 10); n > 0; n--) {
-        const fmi3ValueReference reference = (fmi3ValueReference)strtoul(*word++, NULL, 10);
-        const double value = strtod(*word++, NULL);
-        check(set_values(f, &reference, 1, &value, 1), "set");
-    }
+    char **word = start_flight(library, f, tolerance, words + 6);
     fmi3Boolean event, terminate, early;
     double last, sink = 0.0, values[MOST];
     fmi3FMUState start = NULL;
@@ -70,14 +49,7 @@ int main(int count, char **words) {
     /* The state to come back to is one at time 0 whose principal axes have been found. */
     fmi3ResetTYPE *reset = look_up(library, "fmi3Reset");
     check(reset(f), "reset");
-    check(enter(f, tolerance > 0.0, tolerance, 0.0, false, 0.0), "enter");
-    check(leave(f), "leave");
-    word = words + 6;
-    for (long n = strtol(*word++, NULL, 10); n > 0; n--) {
-        const fmi3ValueReference reference = (fmi3ValueReference)strtoul(*word++, NULL, 10);
-        const double value = strtod(*word++, NULL);
-        check(set_values(f, &reference, 1, &value, 1), "set");
-    }
+    start_flight(library, f, tolerance, words + 6);
     double all[MOST];
     check(get_values(f, got, get_count, all, get_count), "get");
     check(save(f, &start), "save");

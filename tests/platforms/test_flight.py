@@ -98,7 +98,8 @@ def compile_host(platform: Platform, folder: Path) -> Path:
     program = folder / ("host.exe" if platform.suffix == ".dll" else "host")
     flags = [flag for flag in FLAGS if flag != "-shared"]
     command = [sys.executable, "-m", "ziglang", "cc", "-target", platform.target, *flags]
-    command += ["-isystem", str(fmi_headers()), "-o", str(program), str(Path(__file__).with_name("host.c"))]
+    command += ["-isystem", str(fmi_headers()), f"-I{Path(__file__).parent.parent / 'support'}"]
+    command += ["-o", str(program), str(Path(__file__).with_name("host.c"))]
     cache = str(compiler_cache())
     environment = os.environ | {"ZIG_GLOBAL_CACHE_DIR": cache, "ZIG_LOCAL_CACHE_DIR": cache}
     libraries = ["-ldl"] if platform.suffix == ".so" else []

@@ -6,32 +6,11 @@
    inertial axes (3) and kinetic energy.
    Prints the largest changes over all steps, relative: of the energy, of the momentum's length, of the momentum as a
    vector; then how far the attitude's length came off 1. */
-#include <dlfcn.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "fmi3FunctionTypes.h"
-
-static void *look_up(void *library, const char *name) {
-    void *symbol = dlsym(library, name);
-    if (!symbol) {
-        fprintf(stderr, "%s: not found\n", name);
-        exit(1);
-    }
-    return symbol;
-}
-
-static void check(fmi3Status status, const char *what) {
-    if (status == fmi3OK) return;
-    fprintf(stderr, "%s: status %d\n", what, (int)status);
-    exit(1);
-}
-
-static void logged(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category, fmi3String message) {
-    (void)environment, (void)status, (void)category;
-    fprintf(stderr, "%s\n", message);
-}
+#include "library.h"
 
 static double length_of(const double v[], int count) {
     double square = 0.0;
@@ -45,11 +24,7 @@ static void keep_largest(double *largest, double value) {
 
 int main(int count, char **words) {
     if (count != 9) return 2;
-    void *library = dlopen(words[1], RTLD_NOW);
-    if (!library) {
-        fprintf(stderr, "%s\n", dlerror());
-        return 1;
-    }
+    void *library = load(words[1]);
     fmi3InstantiateCoSimulationTYPE *instantiate = look_up(library, "fmi3InstantiateCoSimulation");
     fmi3EnterInitializationModeTYPE *enter = look_up(library, "fmi3EnterInitializationMode");
     fmi3ExitInitializationModeTYPE *leave = look_up(library, "fmi3ExitInitializationMode");
@@ -61,7 +36,7 @@ int main(int count, char **words) {
     for (unsigned i = 0; i < 4; i++) got[i] = (fmi3ValueReference)strtoul(words[6], NULL, 10) + i;
     for (unsigned i = 0; i < 3; i++) got[4 + i] = (fmi3ValueReference)strtoul(words[7], NULL, 10) + i;
     got[7] = (fmi3ValueReference)strtoul(words[8], NULL, 10);
-    fmi3Instance f = instantiate("long", words[2], NULL, false, true, false, false, NULL, 0, NULL, logged, NULL);
+    fmi3Instance f = instantiate("long", words[2], NULL, false, true, false, false, NULL, 0, NULL, log_message, NULL);
     if (!f) return 1;
     check(enter(f, tolerance > 0.0, tolerance, 0.0, false, 0.0), "enter");
     check(leave(f), "leave");

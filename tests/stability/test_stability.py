@@ -256,6 +256,7 @@ def build_host(folder: Path) -> Path:
     command += [
         "-isystem",
         str(fmi_headers()),
+        f"-I{Path(__file__).parent.parent / 'support'}",
         str(Path(__file__).with_name("long_run.c")),
         "-o",
         str(program),
