@@ -20,7 +20,7 @@ def consistency_problems(raw: Mapping[str, Any]) -> list[str]:
         problems += _moments(f"vessels.{name}", vessel)
         for port, table in tables(vessel, "ports"):
             problems += _directions(f"vessels.{name}.ports.{port}", table)
-    return [*problems, *_experiment(raw), *_ranges(raw), *_total_mass(raw), *_propagator(raw)]
+    return [*problems, *_experiment(raw), *_ranges(raw), *_total_mass(raw), *_propagator(raw), *_changes(raw)]
 
 
 def _moments(place: str, vessel: Mapping[str, Any]) -> Iterator[str]:
@@ -112,5 +112,23 @@ def _propagator(raw: Mapping[str, Any]) -> Iterator[str]:
         return
     if rotation.get("law") == "none":
         yield 'rotation.propagator = "split": must be "exact" for rotation.law = "none": torque does nothing'
-    elif not inputs.get("torque"):
+    elif not any(inputs.get(key) for key in ("torque", "force", "vessel_torque")):
         yield 'rotation.propagator = "split": must be "exact" or "auto" without inputs.torque'
+
+
+def _changes(raw: Mapping[str, Any]) -> Iterator[str]:
+    """Yields why what a change shall keep makes no sense with what the scene has."""
+    rotation, inputs = (raw.get(key, {}) for key in ("rotation", "inputs"))
+    if not (isinstance(rotation, Mapping) and isinstance(inputs, Mapping)):
+        return
+    if rotation.get("law") == "none":
+        for key in ("mass_change", "pose_change"):
+            if rotation.get(key) == "momentum":
+                yield f'rotation.{key} = "momentum": must be "rate" for rotation.law = "none": the rate never changes'
+        if inputs.get("motion"):
+            yield 'inputs.motion: makes no sense with rotation.law = "none": the rate never changes'
+    if rotation.get("pose_change") == "rate" and inputs.get("motion"):
+        yield 'rotation.pose_change = "rate": must be "momentum" where inputs.motion lists ports'
+    if rotation.get("propagator") in ("split", "taylor") and inputs.get("motion"):
+        allowed = '"auto", "rk4", "dop853" or "exact" where inputs.motion lists ports'
+        yield f'rotation.propagator = "{rotation["propagator"]}": must be {allowed}'

@@ -130,9 +130,11 @@ def simplification(on: bool) -> Iterator[None]:
 @simplification(True)
 def equations(scene: Scene) -> Equations:
     """Returns the equations of a scene, folded for what it holds constant."""
-    inputs = [variable.name for variable in input_variables(scene)]
-    p_names = tuple(name for name in inputs if not name.startswith("torque["))
-    u_names = tuple(name for name in inputs if name.startswith("torque["))
+    inputs = input_variables(scene)
+    p_names, k_names, u_names = (
+        tuple(variable.name for variable in inputs if variable.part == part)
+        for part in ("shape", "contact", "action")
+    )
     p, u, x, h = (ca.SX.sym(*s) for s in (("p", len(p_names)), ("u", len(u_names)), ("x", 7), ("h", 1)))
 
     law, plan = LAWS[scene.rotation.law], plan_of(scene)
@@ -243,7 +245,7 @@ def p_start(scene: Scene) -> NDArray[np.float64]:
     """
     values = []
     for variable in input_variables(scene):
-        if variable.group == "torque":
+        if variable.part != "shape":
             continue
         owner, _, kind = variable.group.rpartition(".")
         start = variable.start
@@ -257,7 +259,7 @@ def p_start(scene: Scene) -> NDArray[np.float64]:
 @simplification(True)
 def composite_at_start(scene: Scene) -> dict[str, NDArray[np.float64]]:
     """Returns the parts of c by name, (n,) each, for the scene's own values of the inputs."""
-    inputs = [v for v in input_variables(scene) if v.group != "torque"]
+    inputs = [v for v in input_variables(scene) if v.part == "shape"]
     p = ca.SX.sym("p", len(inputs))
     names = tuple(v.name for v in inputs)
     c = ca.Function("composite", [p], [_composite(scene, names, p, LAWS[scene.rotation.law].prepare)])

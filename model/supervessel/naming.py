@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from supervessel.problems import quantity, unknown
-from supervessel.scene import OUTPUT_NAMES, input_groups
+from supervessel.scene import OUTPUT_NAMES, VESSEL_OUTPUT_NAMES, input_groups
 
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 MODEL_NAME = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*_?")
@@ -35,14 +35,14 @@ RESERVED = frozenset(
 
 def naming_problems(raw: Mapping[str, Any]) -> list[str]:
     """Returns what is wrong with the names of a scene, given as the raw tables of its file."""
-    ports = _ports(raw)
+    ports = _parts(raw, "ports")
     return [
         *_model_name(raw),
         *_identifiers(raw, ports),
         *_docks(raw, ports),
         *_inputs(raw, ports),
         *_ranges(raw),
-        *_outputs(raw),
+        *_outputs(raw, ports),
     ]
 
 
@@ -57,9 +57,16 @@ def _list(raw: Any, key: str) -> list[Any]:
     return list(value) if isinstance(value, list | tuple) else []
 
 
-def _ports(raw: Mapping[str, Any]) -> dict[str, list[str]]:
-    """Returns the names of the ports of each vessel."""
-    return {vessel: list(_table(table, "ports")) for vessel, table in _table(raw, "vessels").items()}
+def _parts(raw: Mapping[str, Any], key: str) -> dict[str, list[str]]:
+    """Returns the names of the "ports" or "points" of each vessel."""
+    return {vessel: list(_table(table, key)) for vessel, table in _table(raw, "vessels").items()}
+
+
+def _dock_names(raw: Mapping[str, Any]) -> dict[int, str]:
+    """Returns the names of those docks that have one, by number from 1."""
+    docks = enumerate(_list(raw, "docks"), start=1)
+    names = {i: dock.get("name") for i, dock in docks if isinstance(dock, Mapping)}
+    return {i: name for i, name in names.items() if isinstance(name, str)}
 
 
 def _model_name(raw: Mapping[str, Any]) -> Iterator[str]:
@@ -71,32 +78,47 @@ def _model_name(raw: Mapping[str, Any]) -> Iterator[str]:
 def _identifiers(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[str]:
     if not ports and isinstance(raw.get("vessels"), Mapping):
         yield "vessels: at least one vessel is needed"
+    points = _parts(raw, "points")
     places = [("vessels", vessel) for vessel in ports]
-    places += [(f"vessels.{vessel}.ports", port) for vessel, names in ports.items() for port in names]
+    for key, owners in (("ports", ports), ("points", points)):
+        places += [(f"vessels.{vessel}.{key}", part) for vessel, names in owners.items() for part in names]
+    places += [(f"docks[{i}].name", name) for i, name in _dock_names(raw).items()]
     for place, name in places:
         if not IDENTIFIER.fullmatch(name):
             rule = "must be a letter or underscore, then letters, digits, underscores"
             yield f"{place}: name {quantity(name)} {rule}"
         elif name in RESERVED:
             yield f'{place}: name "{name}" is reserved for a variable of the FMU'
+    for vessel, names in points.items():
+        for name in sorted(set(names).intersection(ports[vessel])):
+            yield f'vessels.{vessel}.points: name "{name}" is that of a port of {vessel}'
+    first: dict[str, int] = {}
+    for i, name in _dock_names(raw).items():
+        if name in ports:
+            yield f'docks[{i}].name: name "{name}" is that of a vessel'
+        elif first.setdefault(name, i) != i:
+            yield f'docks[{i}].name: name "{name}" is that of docks[{first[name]}]'
 
 
-def _port_problem(name: object, ports: Mapping[str, list[str]]) -> str:
-    """Returns why `name` is no port of the scene, or "" if it is one."""
+def _port_problem(name: object, ports: Mapping[str, list[str]], kind: str = "port") -> str:
+    """Returns why `name` is no port (or point) of the scene, or "" if it is one."""
     if not isinstance(name, str) or name.count(".") != 1:
-        return f'{quantity(name)} must be a port, written "vessel.port"'
+        return f'{quantity(name)} must be a {kind}, written "vessel.{kind}"'
     vessel, port = name.split(".")
     if vessel not in ports:
         return unknown("vessel", vessel, ports)
     if port not in ports[vessel]:
-        return unknown(f"port of {vessel}", port, ports[vessel])
+        return unknown(f"{kind} of {vessel}", port, ports[vessel])
     return ""
 
 
 def _docks(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[str]:
-    """Yields what keeps the docks from making a tree that reaches every vessel from the root."""
-    component = {vessel: vessel for vessel in ports}
+    """Yields what keeps the docks closed at the start from making a forest, and all of them from reaching
+    every vessel from the root."""
+    switched = _list(_table(raw, "inputs"), "docked")
+    closed, reached = ({vessel: vessel for vessel in ports} for _ in range(2))
     taken: dict[str, str] = {}
+    always: dict[str, str] = {}
     complete = True
     for number, dock in enumerate(_list(raw, "docks"), start=1):
         place = f"docks[{number}].ports"
@@ -106,24 +128,33 @@ def _docks(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[s
             if names and all(isinstance(name, str) for name in names):
                 yield f'{place} = {quantity(dock["ports"])}: must be two ports, written "vessel.port"'
             continue
+        switchable = isinstance(dock.get("name"), str) and dock["name"] in switched
+        open_at_start = dock.get("docked", True) is False
+        if open_at_start and not switchable:
+            yield f"docks[{number}].docked = false: must be true for a dock that inputs.docked does not list"
         problems = [problem for name in names if (problem := _port_problem(name, ports))]
         yield from (f"{place}: {problem}" for problem in problems)
+        occupied = always if open_at_start and switchable else taken
         yield from (
-            f"{place}: port {name} is docked already, in {taken[name]}" for name in names if name in taken
+            f"{place}: port {name} is docked already, in {occupied[name]}" for name in names if name in occupied
         )
-        taken |= dict.fromkeys(names, f"docks[{number}]")
         vessels = [name.partition(".")[0] for name in names]
         if not all(vessel in ports for vessel in vessels):
             complete = False
         elif vessels[0] == vessels[1]:
             yield f"{place}: both ports belong to {vessels[0]}; a dock joins two vessels"
-        elif component[vessels[0]] == component[vessels[1]]:
-            joined = " and ".join(vessels)
-            yield f"{place}: {names[0]} - {names[1]} closes a loop; {joined} are joined already"
         else:
-            absorbed = component[vessels[1]]
-            component |= {v: component[vessels[0]] for v, c in component.items() if c == absorbed}
-    yield from _root(raw, component if complete else {}, ports)
+            if not open_at_start and closed[vessels[0]] == closed[vessels[1]]:
+                joined = " and ".join(vessels)
+                yield f"{place}: {names[0]} - {names[1]} closes a loop; {joined} are joined already"
+            for component in (reached,) if open_at_start else (closed, reached):
+                absorbed = component[vessels[1]]
+                component |= {v: component[vessels[0]] for v, c in component.items() if c == absorbed}
+        if not open_at_start:
+            taken |= dict.fromkeys(names, f"docks[{number}]")
+        if not switchable:
+            always |= dict.fromkeys(names, f"docks[{number}]")
+    yield from _root(raw, reached if complete else {}, ports)
 
 
 def _root(
@@ -141,21 +172,32 @@ def _root(
 
 
 def _inputs(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[str]:
-    inputs = _table(raw, "inputs")
+    inputs, points = _table(raw, "inputs"), _parts(raw, "points")
     docked = {name for dock in _list(raw, "docks") for name in _list(dock, "ports") if isinstance(name, str)}
     all_resolved = not any(_port_problem(name, ports) for name in docked)
-    for key in ("mass", "pmi", "pose"):
+    posed = _list(inputs, "pose")
+    docks = list(_dock_names(raw).values())
+    for key in ("mass", "pmi", "pose", "motion", "docked", "force", "vessel_torque"):
         names = [name for name in _list(inputs, key) if isinstance(name, str)]
         place = f"inputs.{key}"
         for name in sorted({name for name in names if names.count(name) > 1}):
             yield f"{place}: {name} is listed {names.count(name)} times"
         for name in dict.fromkeys(names):
-            if key == "pose":
+            if key in ("pose", "motion"):
                 problem = _port_problem(name, ports)
                 if problem:
                     yield f"{place}: {problem}"
+                elif key == "motion" and name not in posed:
+                    yield f"{place}: {name} is not listed in inputs.pose; only a pose that is an input moves"
                 elif name not in docked and all_resolved:
                     yield f"{place}: {name} is not docked; its pose would change nothing"
+            elif key == "docked":
+                if name not in docks:
+                    yield f"{place}: {unknown('dock', name, docks)}"
+            elif key == "force":
+                problem = _port_problem(name, points, "point")
+                if problem:
+                    yield f"{place}: {problem}"
             elif name not in ports:
                 yield f"{place}: {unknown('vessel', name, ports)}"
             elif key == "pmi" and "inertia" in _table(_table(raw, "vessels"), name):
@@ -164,8 +206,9 @@ def _inputs(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[
 
 def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:
     inputs = _table(raw, "inputs")
-    mass, pmi, pose = (_list(inputs, key) for key in ("mass", "pmi", "pose"))
-    groups = input_groups(mass, pmi, pose, inputs.get("torque") is True)
+    lists = {key: _list(inputs, key) for key in inputs if key != "torque"}
+    groups = input_groups(lists | {"torque": inputs.get("torque")})
+    groups = {name: size for name, size in groups.items() if not name.endswith(".docked")}
     known = list(groups) + [f"{name}[{i}]" for name, size in groups.items() for i in range(1, size + 1)]
     for name, bounds in _table(inputs, "range").items():
         if isinstance(bounds, Mapping):
@@ -175,10 +218,17 @@ def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:
             yield f"inputs.range: {unknown('input', name, known)}"
 
 
-def _outputs(raw: Mapping[str, Any]) -> Iterator[str]:
+def _outputs(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[str]:
     names = [name for name in _list(_table(raw, "outputs"), "names") if isinstance(name, str)]
     for name in sorted({name for name in names if names.count(name) > 1}):
         yield f"outputs.names: {name} is listed {names.count(name)} times"
     for name in dict.fromkeys(names):
-        if name not in OUTPUT_NAMES:
+        vessel, dot, output = name.partition(".")
+        if dot and vessel in ports and output in VESSEL_OUTPUT_NAMES:
+            continue
+        if dot and vessel in ports:
+            yield f"outputs.names: {unknown(f'output of {vessel}', output, VESSEL_OUTPUT_NAMES)}"
+        elif dot and output in VESSEL_OUTPUT_NAMES:
+            yield f"outputs.names: {unknown('vessel', vessel, ports)}"
+        elif name not in OUTPUT_NAMES:
             yield f"outputs.names: {unknown('output', name, OUTPUT_NAMES)}"

@@ -4,7 +4,7 @@ Every number is in SI units. The classes hold what a scene file says, checked on
 `supervessel.loading` reads files and checks what the tables say of each other.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
@@ -45,8 +45,12 @@ OUTPUT_NAMES = (
     "principal_moments",
     "principal_axes",
     "error_estimate",
+    "net_force",
 )
+"""Outputs of the whole."""
 
+VESSEL_OUTPUT_NAMES = ("origin", "centre_of_mass", "attitude", "angular_velocity", "angular_momentum")
+"""Outputs of a vessel, written "vessel.output"."""
 
 VARIABLE_UNITS = {
     "mass": "kg",
@@ -54,7 +58,11 @@ VARIABLE_UNITS = {
     "position": "m",
     "direction": "",
     "alignment": "",
+    "velocity": "m/s",
+    "rate": "rad/s",
+    "docked": "",
     "torque": "N.m",
+    "force": "N",
     "barycentre": "m",
     "inertia": "kg.m2",
     "angular_velocity": "rad/s",
@@ -64,6 +72,9 @@ VARIABLE_UNITS = {
     "principal_moments": "kg.m2",
     "principal_axes": "",
     "error_estimate": "rad",
+    "net_force": "N",
+    "origin": "m",
+    "centre_of_mass": "m",
 }
 """Units of inputs and outputs by the last part of their names, as FMI writes them; "" for a pure number."""
 
@@ -105,6 +116,7 @@ Name = Annotated[str, BeforeValidator(_text)]
 Names = Annotated[tuple[str, ...], BeforeValidator(_names)]
 Flag = Annotated[bool, BeforeValidator(_flag)]
 Law = Literal["none", "decoupled", "principal", "tensor"]
+Kept = Literal["rate", "momentum"]
 Propagator = Literal["auto", "rk4", "dop853", "taylor", "exact", "split"]
 
 
@@ -114,6 +126,12 @@ class Port(Table):
     position: Position
     direction: Direction
     alignment: Direction
+
+
+class Point(Table):
+    """A point where a force acts: position [m], vessel axes."""
+
+    position: Position
 
 
 class Vessel(Table):
@@ -128,6 +146,7 @@ class Vessel(Table):
     inertia: Tensor | None = None
     centre_of_mass: Position = ORIGIN
     ports: dict[str, Port] = Field(default_factory=dict)
+    points: dict[str, Point] = Field(default_factory=dict)
 
     @property
     def specific_inertia(self) -> Matrix:
@@ -140,28 +159,52 @@ class Vessel(Table):
 
 
 class Dock(Table):
-    """Two docking ports, "vessel.port" each, that are mated."""
+    """Two docking ports, "vessel.port" each, that are mated: always, or while `docked` is true.
+
+    A dock listed in `inputs.docked` needs a `name`; `docked` is then its value at the start.
+    """
 
     ports: Names
+    name: Name | None = None
+    docked: Flag = True
 
 
 class Inputs(Table):
-    """What may change while the scene runs; everything else is a constant."""
+    """What may change while the scene runs; everything else is a constant.
+
+    mass, pmi     : vessels
+    pose          : docked ports
+    motion        : those of them whose velocity and rate are inputs too
+    docked        : docks, by name
+    torque        : about the barycentre
+    force         : points, "vessel.point"
+    vessel_torque : vessels
+    """
 
     mass: Names = ()
     pmi: Names = ()
     pose: Names = ()
+    motion: Names = ()
+    docked: Names = ()
     torque: Flag = False
+    force: Names = ()
+    vessel_torque: Names = ()
     range: dict[str, Bounds] = Field(default_factory=dict)
 
 
 class Rotation(Table):
-    """The rotation law, how it is propagated, and the state at the start."""
+    """The rotation law, how it is propagated, what changes keep, and the state at the start.
+
+    mass_change, pose_change : what a change of masses and moments, of poses keeps: the angular velocity or
+                               the angular momentum; see `Scene.keeps` for the default of pose_change
+    """
 
     law: Annotated[Law, _one_of(*get_args(Law))] = "tensor"
     propagator: Annotated[Propagator, _one_of(*get_args(Propagator))] = "auto"
     tolerance: Tolerance = 1e-9
     max_angle_step: Angle = 0.05
+    mass_change: Annotated[Kept, _one_of(*get_args(Kept))] = "rate"
+    pose_change: Annotated[Kept, _one_of(*get_args(Kept))] | None = None
     angular_velocity: AngularVelocity = ORIGIN
     attitude: Attitude = (1.0, 0.0, 0.0, 0.0)
 
@@ -196,11 +239,39 @@ class Scene(Table):
         vessel, port = name.split(".")
         return self.vessels[vessel].ports[port]
 
+    def point(self, name: str) -> Point:
+        """Returns the point called "vessel.point". Raises KeyError if there is none."""
+        vessel, point = name.split(".")
+        return self.vessels[vessel].points[point]
+
+    def dock(self, name: str) -> Dock:
+        """Returns the dock of that name. Raises KeyError if there is none."""
+        for dock in self.docks:
+            if dock.name == name:
+                return dock
+        raise KeyError(name)
+
+    @property
+    def keeps(self) -> dict[str, Kept]:
+        """What a change keeps, for the kinds of change that the inputs can make: "mass" (and moments), "pose".
+
+        A pose keeps momentum unless the scene says otherwise; the law "none" keeps the angular velocity
+        always.
+        """
+        inputs, rotation = self.inputs, self.rotation
+        kinds: dict[str, Kept] = {}
+        if inputs.mass or inputs.pmi:
+            kinds["mass"] = rotation.mass_change
+        if inputs.pose:
+            kinds["pose"] = rotation.pose_change or ("rate" if rotation.law == "none" else "momentum")
+        return kinds
+
 
 TABLES: dict[tuple[str, ...], type[Table]] = {
     (): Scene,
     ("vessels", "*"): Vessel,
     ("vessels", "*", "ports", "*"): Port,
+    ("vessels", "*", "points", "*"): Point,
     ("docks", "*"): Dock,
     ("inputs",): Inputs,
     ("rotation",): Rotation,
@@ -225,15 +296,26 @@ def tables(raw: Any, key: str) -> list[tuple[str, Mapping[str, Any]]]:
     return [(name, table) for name, table in found if isinstance(table, Mapping)]
 
 
-def input_groups(
-    mass: Iterable[str], pmi: Iterable[str], pose: Iterable[str], torque: bool
-) -> dict[str, int]:
+def input_groups(inputs: Mapping[str, Any]) -> dict[str, int]:
     """Returns the inputs that the lists of `[inputs]` ask for: name without index -> elements (scalar: 0).
 
-    The order is that of the FMU's model description; the twin's p is all but the torque.
+    inputs : the table by its keys; what is missing is empty
+    The order is that of the FMU's model description: what shapes the composite, the motion at contact, what
+    acts.
     """
-    groups = {f"{name}.mass": 0 for name in mass}
-    groups |= {f"{name}.pmi": 3 for name in pmi}
-    for name in pose:
-        groups |= {f"{name}.{part}": 3 for part in ("position", "direction", "alignment")}
-    return groups | ({"torque": 3} if torque else {})
+
+    def names(key: str) -> list[str]:
+        return [name for name in inputs.get(key, ()) if isinstance(name, str)]
+
+    groups = {f"{name}.mass": 0 for name in names("mass")}
+    groups |= {f"{name}.pmi": 3 for name in names("pmi")}
+    moving = set(names("motion"))
+    for name in names("pose"):
+        parts = ("position", "direction", "alignment", *(("velocity", "rate") if name in moving else ()))
+        groups |= {f"{name}.{part}": 3 for part in parts}
+    groups |= {f"{name}.docked": 0 for name in names("docked")}
+    for name in names("docked"):
+        groups |= {f"{name}.velocity": 3, f"{name}.rate": 3}
+    groups |= {"torque": 3} if inputs.get("torque") is True else {}
+    groups |= {f"{name}.force": 3 for name in names("force")}
+    return groups | {f"{name}.torque": 3 for name in names("vessel_torque")}

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import hypot, isfinite
+from typing import Literal
 
 import numpy as np
 
@@ -35,11 +36,24 @@ class Variable:
         return self.name.partition("[")[0]
 
 
+    @property
+    def boolean(self) -> bool:
+        """Whether it is true or false; its numbers are then 1 and 0."""
+        return self.name.endswith(".docked")
+
+
+Part = Literal["shape", "contact", "action"]
+
+
 @dataclass(frozen=True)
 class InputVariable(Variable):
-    """An input; it always has a start value, the scene's."""
+    """An input, or a parameter; it always has a start value, the scene's.
+
+    part : of an input: whether it shapes the composite, is the motion with which a part docks, or acts
+    """
 
     start: float = 0.0
+    part: Part = "shape"
 
 
 AXES = ("x", "y", "z")
@@ -59,7 +73,17 @@ OUTPUT_DESCRIPTIONS = {
     "principal_axes": "unit quaternion from principal to body axes, of the four that fit the one with the "
     "largest scalar part",
     "error_estimate": "estimated error of the attitude that the last communication step added",
+    "net_force": "sum of the forces, body axes",
 }
+
+VESSEL_OUTPUT_DESCRIPTIONS = {
+    "origin": "origin of {}, from the barycentre, body axes",
+    "centre_of_mass": "centre of mass of {}, from the barycentre, body axes",
+    "attitude": "unit quaternion from the axes of {} to body axes",
+    "angular_velocity": "angular velocity of {} relative to inertial space, its own axes",
+    "angular_momentum": "share of {} in the angular momentum about the barycentre, inertial axes",
+}
+"""Of outputs of a vessel; they are all zero while it is not docked to the root's part."""
 
 STATES = {"attitude": QUATERNION, "angular_velocity": AXES}
 
@@ -67,25 +91,41 @@ RATE_UNITS = {"": "1/s", "rad/s": "rad/s2"}
 
 
 def input_variables(scene: Scene) -> tuple[InputVariable, ...]:
-    """Returns the inputs in the order of the model description: masses, PMI, poses, then the torque."""
+    """Returns the inputs in the order of the model description: shape, contact, action."""
     inputs = scene.inputs
     variables = []
-    for group, size in input_groups(inputs.mass, inputs.pmi, inputs.pose, inputs.torque).items():
+    for group, size in input_groups(dict(inputs)).items():
         owner, _, kind = group.rpartition(".")
         for index in range(1, size + 1) if size else (0,):
             name = f"{group}[{index}]" if index else group
             lowest = 0.0 if kind in ("mass", "pmi") else None
             low, high = inputs.range.get(name, inputs.range.get(group, (lowest, None)))
-            start = _start(scene, owner, kind, index)
-            description = _input_description(owner, kind, index)
-            variables.append(InputVariable(name, VARIABLE_UNITS[kind], description, start, low, high))
+            variables.append(
+                InputVariable(
+                    name,
+                    VARIABLE_UNITS[kind],
+                    _input_description(scene, owner, kind, index),
+                    _start(scene, owner, kind, index),
+                    low,
+                    high,
+                    part=_part(scene, owner, kind),
+                )
+            )
     return tuple(variables)
+
+
+def _part(scene: Scene, owner: str, kind: str) -> Part:
+    if kind in ("torque", "force"):
+        return "action"
+    return "contact" if kind in ("velocity", "rate") and owner in scene.inputs.docked else "shape"
 
 
 def _start(scene: Scene, owner: str, kind: str, index: int) -> float:
     """Returns the scene's value of an input; `index` counts from 1, 0 for a scalar."""
-    if kind == "torque":
+    if kind in ("torque", "force", "velocity", "rate"):
         return 0.0
+    if kind == "docked":
+        return float(scene.dock(owner).docked)
     if kind == "mass":
         return scene.vessels[owner].mass
     if kind == "pmi":
@@ -96,16 +136,29 @@ def _start(scene: Scene, owner: str, kind: str, index: int) -> float:
     return value[index - 1]
 
 
-def _input_description(owner: str, kind: str, index: int) -> str:
+def _input_description(scene: Scene, owner: str, kind: str, index: int) -> str:
     axis = AXES[index - 1]
     vessel = owner.partition(".")[0]
+    if owner in scene.inputs.docked:
+        first, second = scene.dock(owner).ports
+        meeting = f"at contact, of {second} relative to {first}, {axis} in the axes of {first.partition('.')[0]}"
+        return {
+            "docked": f"whether {first} and {second} are docked",
+            "velocity": f"velocity {meeting}",
+            "rate": f"angular velocity {meeting}",
+        }[kind]
     return {
         "mass": f"mass of {owner}",
         "pmi": f"mass-normalised moment of inertia of {owner} about its {axis} axis",
         "position": f"position of docking port {owner}, {axis} in the axes of {vessel}",
         "direction": f"approach direction of docking port {owner}, outward, {axis} in the axes of {vessel}",
         "alignment": f"alignment direction of docking port {owner}, {axis} in the axes of {vessel}",
-        "torque": f"external torque about the barycentre, {axis} in body axes",
+        "velocity": f"rate of change of the position of docking port {owner}, {axis} in the axes of {vessel}",
+        "rate": f"angular velocity of docking port {owner} relative to {vessel}, {axis} in the axes of {vessel}",
+        "torque": f"external torque on {owner}, {axis} in its axes"
+        if owner
+        else f"external torque about the barycentre, {axis} in body axes",
+        "force": f"external force at {owner}, {axis} in the axes of {vessel}",
     }[kind]
 
 
@@ -136,13 +189,18 @@ def output_variables(scene: Scene) -> tuple[Variable, ...]:
     return tuple(
         Variable(
             name,
-            VARIABLE_UNITS[group],
-            f"{OUTPUT_DESCRIPTIONS[group]}{label}",
-            nominal=_usable(nominal.get(group, 1.0)),
+            VARIABLE_UNITS[group.rpartition(".")[2]],
+            f"{_output_description(group)}{label}",
+            nominal=_usable(nominal.get(group.rpartition(".")[2], 1.0)),
         )
         for group in scene.outputs.names
         for name, label in _elements(group)
     )
+
+
+def _output_description(group: str) -> str:
+    vessel, _, output = group.rpartition(".")
+    return VESSEL_OUTPUT_DESCRIPTIONS[output].format(vessel) if vessel else OUTPUT_DESCRIPTIONS[group]
 
 
 def _output_nominals(scene: Scene) -> dict[str, float]:
@@ -170,7 +228,7 @@ def _elements(group: str) -> Iterable[tuple[str, str]]:
                 yield f"inertia[{i},{j}]", f", {row}{column}"
     else:
         labels = {"attitude": QUATERNION, "principal_axes": QUATERNION, "principal_moments": NUMBERS}.get(
-            group, AXES
+            group.rpartition(".")[2], AXES
         )
         for i, label in enumerate(labels, start=1):
             yield f"{group}[{i}]", f", {label}"
