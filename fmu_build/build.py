@@ -5,6 +5,7 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from fmu_build.changes import change_tables
 from fmu_build.codegen import digest, model_source, scene_header, scene_source
 from fmu_build.compiler import compile_binaries, compiler_cache
 from fmu_build.documentation import documentation
@@ -54,12 +55,12 @@ def generate(scene: Scene, fmi: int) -> tuple[dict[str, str], bytes]:
     sources = {
         "model.c": model_source(model),
         "scene.h": scene_header(scene, model, entries),
-        "scene.c": scene_source(entries, token=""),
+        "scene.c": scene_source(entries, token="") + change_tables(scene, model),
     }
     names = source_file_names(sources, fmi)
     without_token = model_description(scene, entries, "", fmi, names)
     token = digest(*source_files(sources, fmi, scene.name).values(), without_token)
-    sources["scene.c"] = scene_source(entries, token)
+    sources["scene.c"] = scene_source(entries, token) + change_tables(scene, model)
     return sources, model_description(scene, entries, token, fmi, names)
 
 

@@ -9,11 +9,13 @@ from pathlib import Path
 
 import casadi as ca
 
+from fmu_build.changes import change_constants
 from fmu_build.errors import BuildError
 from fmu_build.table import Entry
-from supervessel.equations import Equations, composite_slices
+from supervessel.equations import Equations
 from supervessel.propagators.free_motion import FIRST_ANGLE
 from supervessel.scene import Scene
+from supervessel.variables import InputVariable
 
 CHOICES = {
     "STEPS_NONE": 0,
@@ -54,22 +56,24 @@ def _without_null_checks(source: str) -> str:
 
 def scene_header(scene: Scene, model: Equations, entries: Sequence[Entry]) -> str:
     """Returns scene.h: counts, places and limits of the scene."""
-    where = composite_slices()
+    where = model.slices
     references = {entry.variable.name: entry.reference for entry in entries}
-    p_count, u_count = len(model.p_names), len(model.u_names)
+    p_count, k_count, u_count = len(model.p_names), len(model.k_names), len(model.u_names)
     sizes = [(f.sz_arg(), f.sz_res(), f.sz_iw(), f.sz_w()) for f in model.functions]
     arg, res, iw, w = (max(1, *column) for column in zip(*sizes, strict=True))
     begun = [f for f in model.functions if f.name() == "free_start"]
     constants = {
         "VARIABLE_COUNT": len(entries),
         "INPUT_P_COUNT": p_count,
+        "INPUT_K_COUNT": k_count,
         "INPUT_U_COUNT": u_count,
         "REFERENCE_TIME": 0,
         "REFERENCE_P": 1,
-        "REFERENCE_TORQUE": 1 + p_count,
+        "REFERENCE_CONTACT": 1 + p_count,
+        "REFERENCE_TORQUE": 1 + p_count + k_count,
         "REFERENCE_RATE_START": references["angular_velocity_start[1]"],
         "REFERENCE_ATTITUDE_START": references["attitude_start[1]"],
-        "REFERENCE_OUTPUTS": 1 + p_count + u_count + 7,
+        "REFERENCE_OUTPUTS": 1 + p_count + k_count + u_count + 7,
         "OUTPUT_COUNT": len(model.y_names),
         "REFERENCE_STATES": references["state.attitude[1]"],
         "REFERENCE_DERIVATIVES": references["der(state.attitude[1])"],
@@ -91,7 +95,9 @@ def scene_header(scene: Scene, model: Equations, entries: Sequence[Entry]) -> st
     }
     plan = model.plan
     macros = {
+        "DOCKED_COUNT": len(scene.inputs.docked),
         "AXES_COUNT": model.axes.numel_out(0),
+        **change_constants(scene, model),
         "STEPS": f"STEPS_BY_{plan.method.control.upper()}" if plan.method else "STEPS_NONE",
         "FREE": f"FREE_{plan.free.upper().replace(' ', '_')}",
         "ERROR_EXPONENT": model.error_exponent,
@@ -119,10 +125,11 @@ def _lines(form: str, values: Mapping[str, object]) -> str:
 def scene_source(entries: Sequence[Entry], token: str) -> str:
     """Returns scene.c: the variable table with start values, and the token."""
     needs = {entry.reference: _needs(entry) for entry in entries}
-    rows = "\n".join(f"    {_row(entry, needs)}," for entry in entries)
+    typed = any(entry.variable.boolean for entry in entries)
+    rows = "\n".join(f"    {_row(entry, needs, typed)}," for entry in entries)
     return (
         "/* Generated: the scene's variables, by value reference. */\n"
-        '#include "variables.h"\n\n'
+        '#include "changes.h"\n\n'
         f"const Variable VARIABLES[VARIABLE_COUNT] = {{\n{rows}\n}};\n\n"
         f'const char MODEL_TOKEN[] = "{token}";\n'
     )
@@ -132,13 +139,17 @@ def _needs(entry: Entry) -> frozenset[str]:
     """Returns what must be current before that which follows from a variable can be read."""
     if entry.role == "state":
         return frozenset({"STATES", "ATTITUDE"} if "attitude" in entry.variable.name else {"STATES"})
-    if entry.role == "input" and entry.variable.group != "torque":
+    if isinstance(entry.variable, InputVariable) and entry.role == "input" and entry.variable.part == "shape":
         return frozenset({"COMPOSITE"})
     return frozenset()
 
 
-def _row(entry: Entry, needs: Mapping[int, frozenset[str]]) -> str:
-    """Returns a row of the table; `needs` are those of all variables by reference."""
+def _row(entry: Entry, needs: Mapping[int, frozenset[str]], typed: bool) -> str:
+    """Returns a row of the table.
+
+    needs : those of all variables by reference
+    typed : whether there are variables of more than one type
+    """
     variable = entry.variable
     own = {
         "output": frozenset({"OUTPUTS", "AXES"} if "principal" in variable.group else {"OUTPUTS"}),
@@ -155,6 +166,8 @@ def _row(entry: Entry, needs: Mapping[int, frozenset[str]]) -> str:
         _check(entry),
         " | ".join(f"FOLLOWS_{flag}" for flag in flags) or "0",
     ]
+    if typed:
+        fields.append("TYPE_BOOLEAN" if variable.boolean else "TYPE_NUMBER")
     return "{" + ", ".join(fields) + "}"
 
 

@@ -26,12 +26,14 @@ UNITS = {
     "1/s": Unit({"s": -1}, "QuaternionRate", "Frequency"),
     "kg": Unit({"kg": 1}, "Mass", "Mass"),
     "m": Unit({"m": 1}, "Length", "Length"),
+    "m/s": Unit({"m": 1, "s": -1}, "Velocity", "Velocity"),
     "m2": Unit({"m": 2}, "SpecificMoment", "MassNormalisedMomentOfInertia"),
     "rad": Unit({"rad": 1}, "Angle", "Angle", ("deg", degrees(1.0))),
     "rad/s": Unit({"s": -1, "rad": 1}, "AngularVelocity", "AngularVelocity", ("deg/s", degrees(1.0))),
     "rad/s2": Unit(
         {"s": -2, "rad": 1}, "AngularAcceleration", "AngularAcceleration", ("deg/s2", degrees(1.0))
     ),
+    "N": Unit({"kg": 1, "m": 1, "s": -2}, "Force", "Force"),
     "N.m": Unit({"kg": 1, "m": 2, "s": -2}, "Torque", "Torque"),
     "kg.m2": Unit({"kg": 1, "m": 2}, "MomentOfInertia", "MomentOfInertia"),
     "J": Unit({"kg": 1, "m": 2, "s": -2}, "Energy", "Energy"),
@@ -102,8 +104,9 @@ def _header(scene: Scene, fmi_version: str, token_attribute: str, token: str) ->
 
 def _description(scene: Scene) -> str:
     others = [name for name in scene.vessels if name != scene.root]
+    how = "docked, now and then" if scene.inputs.docked else "docked"
     docked = (
-        f" with {', '.join(others[:8])}{' and others' if len(others) > 8 else ''} docked" if others else ""
+        f" with {', '.join(others[:8])}{' and others' if len(others) > 8 else ''} {how}" if others else ""
     )
     return f"Rotation of {scene.root}{docked}, law {scene.rotation.law}"
 
@@ -118,6 +121,8 @@ def _fmi3(scene: Scene, entries: Sequence[Entry], token: str) -> ET.Element:
         "providesIntermediateUpdate": "true",
         "canReturnEarlyAfterIntermediateUpdate": "true",
     }
+    if scene.inputs.docked:
+        stepping["hasEventMode"] = "true"
     ET.SubElement(root, "CoSimulation", identifier | COMMON_CAPABILITIES_3 | stepping)
     _units(root, entries)
     _types(root, entries, "Float64Type")
@@ -125,12 +130,13 @@ def _fmi3(scene: Scene, entries: Sequence[Entry], token: str) -> ET.Element:
     _experiment(root, scene)
     variables = ET.SubElement(root, "ModelVariables")
     for entry in entries:
-        attributes = _identity(entry) | ROLES[entry.role]
+        attributes = _identity(entry) | _role(entry)
         if entry.role == "output":
             attributes["intermediateUpdate"] = "true"
         if entry.role == "derivative":
             attributes["derivative"] = str(_state_of(entry, entries).reference)
-        ET.SubElement(variables, "Float64", attributes | _type_attributes(entry))
+        kind = "Boolean" if entry.variable.boolean else "Float64"
+        ET.SubElement(variables, kind, attributes | _type_attributes(entry))
     structure = ET.SubElement(root, "ModelStructure")
     for entry in _of(entries, "output"):
         _unknown3(structure, "Output", entry, entry.dependencies)
@@ -158,11 +164,11 @@ def _fmi2(scene: Scene, entries: Sequence[Entry], token: str, sources: Sequence[
     _experiment(root, scene)
     variables = ET.SubElement(root, "ModelVariables")
     for entry in entries:
-        element = ET.SubElement(variables, "ScalarVariable", _identity(entry) | ROLES[entry.role])
+        element = ET.SubElement(variables, "ScalarVariable", _identity(entry) | _role(entry))
         attributes = _type_attributes(entry)
         if entry.role == "derivative":  # FMI 2.0 counts variables from 1
             attributes["derivative"] = str(_state_of(entry, entries).reference + 1)
-        ET.SubElement(element, "Real", attributes)
+        ET.SubElement(element, "Boolean" if entry.variable.boolean else "Real", attributes)
     structure = ET.SubElement(root, "ModelStructure")
     for name, roles in (
         ("Outputs", ("output",)),
@@ -254,9 +260,16 @@ def _identity(entry: Entry) -> dict[str, str]:
     }
 
 
+def _role(entry: Entry) -> dict[str, str]:
+    """Returns causality, variability and initial of a variable."""
+    return ROLES[entry.role] | ({"variability": "discrete"} if entry.variable.boolean else {})
+
+
 def _type_attributes(entry: Entry) -> dict[str, str]:
     """Returns type, unit, range and start of a variable, as both versions of FMI write them."""
     variable = entry.variable
+    if variable.boolean:
+        return {"start": "true" if variable.start else "false"}
     unit = UNITS[variable.unit]
     attributes = {"declaredType": unit.type_name}
     if variable.unit:

@@ -6,7 +6,7 @@ and what comes out, as CSV.
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from math import ceil, sqrt
 from xml.etree import ElementTree as ET
 
@@ -31,12 +31,14 @@ def reference_result(scene: Scene, model: Equations) -> dict[str, bytes]:
     """Returns the files of the reference result by their paths in the archive.
 
     Fifty steps from the scene's start, inputs moving linearly: masses lose up to a tenth within their
-    range, the torque grows to what would double the rate at the start, or give 0.01 rad/s. The steps are the
+    range, unless that would change the rate, the torque grows to what would double the rate at the start, or
+    give 0.01 rad/s; everything else stays. The steps are the
     scene's, or a tenth of them and so on where the body turns fast; a body that turns too fast for all of
     these has no reference result.
     """
     inputs = input_variables(scene)
-    first = np.array([*p_start(scene), *np.zeros(len(model.u_names))])
+    first = np.zeros(len(inputs))
+    first[: len(model.p_names)] = p_start(scene)
     step = scene.experiment.step if scene.experiment else DEFAULT_STEP
     for _ in range(ATTEMPTS):
         times = step * np.arange(STEPS + 1)
@@ -50,16 +52,22 @@ def reference_result(scene: Scene, model: Equations) -> dict[str, bytes]:
         return {}
     ends = np.column_stack([times[[0, -1]], np.vstack([first, last])])
     outputs = [variable.name for variable in output_variables(scene)]
+    booleans = frozenset(variable.name for variable in inputs if variable.boolean)
     return {
         f"{FOLDER}/fmi-ls-manifest.xml": _manifest(),
         f"{FOLDER}/experiments.xml": _experiments(step, float(times[-1])),
-        f"{FOLDER}/inputs.csv": _csv([variable.name for variable in inputs], ends),
+        f"{FOLDER}/inputs.csv": _csv([variable.name for variable in inputs], ends, booleans),
         f"{FOLDER}/outputs.csv": _csv(outputs, np.column_stack([times, results])),
     }
 
 
 def _composite(model: Equations, inputs: Array) -> Array:
     return np.array(model.composite(inputs[: len(model.p_names)])).ravel()
+
+
+def _action(model: Equations, inputs: Array) -> Array:
+    """Returns those of all inputs that act; they are the last ones."""
+    return inputs[len(inputs) - len(model.u_names) :]
 
 
 def _last_inputs(
@@ -72,7 +80,7 @@ def _last_inputs(
     last = []
     for variable, start in zip(inputs, first, strict=True):
         value = float(start)
-        if variable.name.endswith(".mass"):
+        if variable.name.endswith(".mass") and scene.keeps["mass"] == "rate":
             value = max(0.9 * value, variable.low or 0.0)
         elif variable.group == "torque":
             value = min(smallest * rate / duration, variable.high if variable.high is not None else np.inf)
@@ -87,10 +95,10 @@ def _fly(scene: Scene, model: Equations, stimuli: Array, step: float) -> Array |
     None if that takes more than MOST_SUB_STEPS.
     """
     x = np.array([*scene.rotation.attitude, *scene.rotation.angular_velocity])
-    held, taken, p_count = stimuli[0], 0, len(model.p_names)
+    held, taken = stimuli[0], 0
     rows = [_outputs(model, x, held)]
     for inputs in stimuli[1:]:
-        c, u = _composite(model, held), held[p_count:]
+        c, u = _composite(model, held), _action(model, held)
         remaining = step
         while remaining > 0.0:
             square = float(model.fastest_square(x, u, c))
@@ -108,14 +116,18 @@ def _fly(scene: Scene, model: Equations, stimuli: Array, step: float) -> Array |
 
 def _outputs(model: Equations, x: Array, inputs: Array) -> Array:
     c = _composite(model, inputs)
-    return np.array(model.outputs(x, inputs[len(model.p_names) :], c, model.axes(c), 0.0)).ravel()
+    return np.array(model.outputs(x, _action(model, inputs), c, model.axes(c), 0.0)).ravel()
 
 
-def _csv(names: Sequence[str], rows: Array) -> bytes:
+def _csv(names: Sequence[str], rows: Array, booleans: Set[str] = frozenset()) -> bytes:
+    """Returns a table with time in the first column; those named in `booleans` are 0 or 1."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["time", *names])
-    writer.writerows([repr(float(value)) for value in row] for row in rows)
+    columns = ["time", *names]
+    writer.writerow(columns)
+    for row in rows:
+        cells = zip(columns, map(float, row), strict=True)
+        writer.writerow([str(int(value)) if name in booleans else repr(value) for name, value in cells])
     return text.getvalue().encode()
 
 

@@ -3,7 +3,7 @@
 The modelDescription.xml and the C layer are both written from it.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass
 from typing import Literal
 
@@ -67,8 +67,10 @@ def variable_table(scene: Scene, model: Equations) -> tuple[Entry, ...]:
         first[role] = count
         count += len(variables)
     knowns = [*range(first["state"], first["state"] + 7)]
-    knowns += range(first["input"], first["input"] + len(groups["input"]))
-    by_role = _dependencies(model, knowns)
+    inputs = list(enumerate(input_variables(scene), start=first["input"]))
+    knowns += [reference for reference, variable in inputs if variable.part != "contact"]
+    booleans = frozenset(reference for reference, variable in inputs if variable.boolean)
+    by_role = _dependencies(model, knowns, booleans)
     entries = []
     for role, variables in groups.items():
         for i, variable in enumerate(variables):
@@ -81,10 +83,13 @@ def variable_table(scene: Scene, model: Equations) -> tuple[Entry, ...]:
     return tuple(entries)
 
 
-def _dependencies(model: Equations, knowns: Sequence[int]) -> dict[Role, list[tuple[Dependency, ...]]]:
+def _dependencies(
+    model: Equations, knowns: Sequence[int], booleans: Set[int]
+) -> dict[Role, list[tuple[Dependency, ...]]]:
     """Returns the dependencies of each output and each derivative on states and inputs.
 
-    knowns : value references of states and inputs (p, u)
+    knowns   : value references of states and inputs (p, u); what a part docks with acts at that instant alone
+    booleans : those of Booleans among them
     """
     p, u, x = (ca.SX.sym(*s) for s in (("p", len(model.p_names)), ("u", len(model.u_names)), ("x", 7)))
     c = model.composite(p)
@@ -93,15 +98,23 @@ def _dependencies(model: Equations, knowns: Sequence[int]) -> dict[Role, list[tu
     known = ca.vertcat(x, p, u)
     y = model.outputs(x, u, c, a, 0.0)
     unknowns: dict[Role, ca.SX] = {"output": y, "derivative": model.ode(x, u, c)}
-    return {role: _rows(ca.jacobian(unknown, known), knowns) for role, unknown in unknowns.items()}
+    return {role: _rows(unknown, known, knowns, booleans) for role, unknown in unknowns.items()}
 
 
-def _rows(jacobian: ca.SX, knowns: Sequence[int]) -> list[tuple[Dependency, ...]]:
-    """Returns the dependencies that the structure of a Jacobian shows, row by row."""
+def _rows(
+    unknown: ca.SX, known: ca.SX, knowns: Sequence[int], booleans: Set[int]
+) -> list[tuple[Dependency, ...]]:
+    """Returns the dependencies that the structure of a Jacobian shows, row by row.
+
+    A choice by a Boolean has no derivative: there it is the structure of the expression that counts.
+    """
+    jacobian = ca.jacobian(unknown, known)
     rows: list[list[Dependency]] = [[] for _ in range(jacobian.size1())]
-    for row, column in zip(*jacobian.sparsity().get_triplet(), strict=True):
+    for row, column in zip(*ca.jacobian_sparsity(unknown, known).get_triplet(), strict=True):
         element = jacobian[row, column]
-        if not element.is_zero():
+        if knowns[column] in booleans:
+            rows[row].append(Dependency(knowns[column], "dependent"))
+        elif not element.is_zero():
             rows[row].append(Dependency(knowns[column], "constant" if element.is_constant() else "dependent"))
     return [tuple(sorted(row, key=lambda d: d.reference)) for row in rows]
 

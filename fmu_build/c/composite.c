@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "instance.h"
+#include "changes.h"
 #include "model.h"
 
 /* A sum of two moments is compared with a third; see TRIANGLE_SLACK in supervessel/quantities.py. */
@@ -91,7 +91,7 @@ static Status check_port(Instance *instance, const Variable *variable, const dou
 /* Judges the inputs; p holds them and gets directions and alignments scaled. */
 static Status check_inputs(Instance *instance, double p[]) {
     Status status = STATUS_OK;
-    for (size_t i = REFERENCE_P; i < REFERENCE_TORQUE && status == STATUS_OK; i++) {
+    for (size_t i = REFERENCE_P; i < REFERENCE_CONTACT && status == STATUS_OK; i++) {
         const Variable *variable = &VARIABLES[i];
         const double *value = &instance->now.values[i];
         switch (variable->check) {
@@ -101,7 +101,7 @@ static Status check_inputs(Instance *instance, double p[]) {
             case CHECK_NONE: break;
         }
     }
-    return status;
+    return status == STATUS_OK ? changes_check_docks(instance, p) : status;
 }
 
 /* Judges what the inputs make together. */
@@ -121,6 +121,24 @@ static Status check_composite(Instance *instance, const double *c) {
                            J[0], J[1], J[2], J[3], J[4], J[5], LAW_TURNS ? " and positive definite" : "");
 }
 
+Status composite_compute(Instance *instance, const double p[], double c[]) {
+    instance->arg[0] = p;
+    instance->res[0] = c;
+    composite(instance->arg, instance->res, instance->iw, instance->w, 0);
+    return check_composite(instance, c);
+}
+
+/* p and c become current. */
+static Status adopt(Instance *instance, const double p[], const double c[]) {
+#if CHANGES
+    return changes_apply(instance, p, c);
+#else
+    if (p != instance->now.p) memcpy(instance->now.p, p, INPUT_P_COUNT * sizeof(double));
+    if (c != instance->now.c) memcpy(instance->now.c, c, sizeof instance->now.c);
+    return STATUS_OK;
+#endif
+}
+
 Status composite_refresh(Instance *instance) {
     Dynamics *now = &instance->now;
     if (now->composite_is_current) return STATUS_OK;
@@ -128,15 +146,14 @@ Status composite_refresh(Instance *instance) {
     memcpy(p, &now->values[REFERENCE_P], INPUT_P_COUNT * sizeof(double));
     Status status = check_inputs(instance, p);
     if (status != STATUS_OK) return status;
-    now->composite_is_current = now->c[COMPOSITE_MASS] > 0.0 && memcmp(p, now->p, INPUT_P_COUNT * sizeof(double)) == 0;
-    if (now->composite_is_current) return STATUS_OK; /* changed there and back */
-    instance->arg[0] = p;
-    instance->res[0] = c;
-    composite(instance->arg, instance->res, instance->iw, instance->w, 0);
-    status = check_composite(instance, c);
+    if (now->c[COMPOSITE_MASS] > 0.0 && memcmp(p, now->p, INPUT_P_COUNT * sizeof(double)) == 0) {
+        status = adopt(instance, now->p, now->c); /* changed there and back */
+        now->composite_is_current = status == STATUS_OK;
+        return status;
+    }
+    status = composite_compute(instance, p, c);
+    if (status == STATUS_OK) status = adopt(instance, p, c);
     if (status != STATUS_OK) return status;
-    memcpy(now->p, p, INPUT_P_COUNT * sizeof(double));
-    memcpy(now->c, c, sizeof now->c);
     now->composite_is_current = true;
     now->axes_are_current = false;
     instance->outputs_are_current = instance->rates_are_current = false;
@@ -157,7 +174,7 @@ void composite_refresh_axes(Instance *instance) {
 }
 
 void composite_scale_variation(const Instance *instance, double p[]) {
-    for (size_t i = REFERENCE_P; i < REFERENCE_TORQUE; i++) {
+    for (size_t i = REFERENCE_P; i < REFERENCE_CONTACT; i++) {
         if (VARIABLES[i].check != CHECK_PORT) continue;
         for (size_t k = i; k < i + 6; k += 3) {
             double scaled[3];

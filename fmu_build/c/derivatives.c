@@ -1,7 +1,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "instance.h"
+#include "changes.h"
 #include "model.h"
 
 /* What a reference may stand for in a set of knowns or unknowns, as bits of (1 << role). */
@@ -45,23 +45,27 @@ static Status check_request(Instance *instance, const unsigned unknowns[], size_
     if (status == STATUS_OK) status = instance_check_attitude(instance);
     if (status == STATUS_OK) status = composite_refresh(instance);
     if (status == STATUS_OK) composite_refresh_axes(instance);
+#if STATE_IS_MOMENTUM
+    if (status == STATUS_OK) changes_mirror(instance);
+#endif
     return status;
 }
 
 /* Applies the derivative of q = s/|s| to a vector in place; it is symmetric, so it serves both ways. */
 static void project_attitude_start(Instance *instance, double v[4]) {
-    const double *q = instance_states(instance), *s = &instance->now.values[REFERENCE_ATTITUDE_START];
+    const double *q = instance_x(instance), *s = &instance->now.values[REFERENCE_ATTITUDE_START];
     const double length = fabs(s[0] * q[0] + s[1] * q[1] + s[2] * q[2] + s[3] * q[3]);
     const double along = q[0] * v[0] + q[1] * v[1] + q[2] * v[2] + q[3] * v[3];
     for (size_t i = 0; i < 4; i++) v[i] = (v[i] - q[i] * along) / length;
 }
 
-/* Where the variation of a variable stands, or NULL: time changes nothing. Start parameters vary the state that
+/* Where the variation of a variable stands, or NULL: time changes nothing, nor does the motion at contact. Start parameters vary the state that
    they become, the angular velocity's three before the attitude's four. */
 static double *place(Variation *v, unsigned reference) {
     switch (VARIABLES[reference].role) {
         case ROLE_INPUT:
-            return &v->inputs[reference - REFERENCE_P];
+            if (reference >= REFERENCE_TORQUE) return &v->inputs[INPUT_P_COUNT + reference - REFERENCE_TORQUE];
+            return reference < REFERENCE_CONTACT ? &v->inputs[reference - REFERENCE_P] : NULL;
         case ROLE_PARAMETER:
             return reference < REFERENCE_ATTITUDE_START ? &v->x[4 + reference - REFERENCE_RATE_START]
                                                         : &v->x[reference - REFERENCE_ATTITUDE_START];
@@ -76,6 +80,7 @@ static double *place(Variation *v, unsigned reference) {
 static void respond(Instance *instance) {
     Variation *v = &instance->variation;
     instance_set_arguments(instance);
+    instance->arg[0] = instance_states(instance);
     instance->arg[4] = v->x;
     instance->arg[5] = v->inputs + INPUT_P_COUNT;
     instance->arg[6] = v->c;
@@ -104,9 +109,10 @@ Status derivatives_forward(Instance *instance, const unsigned unknowns[], size_t
     for (size_t i = 0; i < known_count; i++) {
         double *change = place(v, knowns[i]);
         if (change) *change += seed[i];
-        shape_changes = shape_changes || (knowns[i] < REFERENCE_TORQUE && seed[i] != 0.0);
+        shape_changes = shape_changes || (knowns[i] < REFERENCE_CONTACT && seed[i] != 0.0);
     }
-    if (instance->now.state & BEFORE_START) project_attitude_start(instance, v->x);
+    const bool at_start = instance->now.state & BEFORE_START;
+    if (at_start) project_attitude_start(instance, v->x);
     if (shape_changes) {
         composite_scale_variation(instance, v->inputs);
         instance->arg[0] = instance->now.p;
@@ -114,6 +120,11 @@ Status derivatives_forward(Instance *instance, const unsigned unknowns[], size_t
         instance->res[0] = v->c;
         composite_forward(instance->arg, instance->res, instance->iw, instance->w, 0);
     }
+#if STATE_IS_MOMENTUM
+    if (at_start) changes_start_forward(instance, v);
+#elif MASSES_KEEP_MOMENTUM || POSES_KEEP_MOMENTUM
+    if (shape_changes && instance->now.state == STEPPING) changes_forward(instance, v);
+#endif
     respond(instance);
     for (size_t i = 0; i < unknown_count; i++) sensitivity[i] = *place(v, unknowns[i]);
     return check_results(instance, unknowns, unknown_count, sensitivity);
@@ -129,22 +140,28 @@ Status derivatives_adjoint(Instance *instance, const unsigned unknowns[], size_t
     memset(v, 0, sizeof *v);
     for (size_t i = 0; i < unknown_count; i++) *place(v, unknowns[i]) += seed[i];
     memcpy(on_states, v->x, sizeof on_states);
+    const bool at_start = instance->now.state & BEFORE_START;
     instance_set_arguments(instance);
+    instance->arg[0] = instance_states(instance);
     instance->arg[4] = v->rate;
     instance->arg[5] = v->y;
     instance->res[0] = v->x;
     instance->res[1] = v->inputs + INPUT_P_COUNT;
     instance->res[2] = v->c;
     response_reverse(instance->arg, instance->res, instance->iw, instance->w, 0);
+    for (size_t i = 0; i < STATE_COUNT && at_start; i++) v->x[i] += on_states[i];
+#if STATE_IS_MOMENTUM
+    if (at_start) changes_start_reverse(instance, v);
+#endif
     instance->arg[0] = instance->now.p;
     instance->arg[1] = v->c;
     instance->res[0] = v->inputs;
     composite_reverse(instance->arg, instance->res, instance->iw, instance->w, 0);
+#if !STATE_IS_MOMENTUM && (MASSES_KEEP_MOMENTUM || POSES_KEEP_MOMENTUM)
+    if (instance->now.state == STEPPING) changes_reverse(instance, v);
+#endif
     composite_scale_variation(instance, v->inputs);
-    if (instance->now.state & BEFORE_START) {
-        for (size_t i = 0; i < STATE_COUNT; i++) v->x[i] += on_states[i];
-        project_attitude_start(instance, v->x);
-    }
+    if (at_start) project_attitude_start(instance, v->x);
     for (size_t i = 0; i < known_count; i++) {
         const double *weight = place(v, knowns[i]);
         sensitivity[i] = weight ? *weight : 0.0;

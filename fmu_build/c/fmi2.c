@@ -141,6 +141,32 @@ fmi2Status fmi2SetReal(fmi2Component instance, const fmi2ValueReference referenc
     return (fmi2Status)instance_set(instance, references, count, values);
 }
 
+#if DOCKED_COUNT
+
+fmi2Status fmi2GetBoolean(fmi2Component instance, const fmi2ValueReference references[], size_t count,
+                          fmi2Boolean values[]) {
+    static const Call call = {"fmi2GetBoolean", STARTED, STATUS_ERROR};
+    if (!instance || !instance_admits(instance, &call)) return fmi2Error;
+    const Status status = instance_check_booleans(instance, references, count, values);
+    for (size_t i = 0; i < count && status == STATUS_OK; i++)
+        values[i] = instance_get_boolean(instance, references[i]) ? fmi2True : fmi2False;
+    return (fmi2Status)status;
+}
+
+fmi2Status fmi2SetBoolean(fmi2Component instance, const fmi2ValueReference references[], size_t count,
+                          const fmi2Boolean values[]) {
+    static const Call call = {"fmi2SetBoolean", BEFORE_START | RUNNING, STATUS_ERROR};
+    if (!instance || !instance_admits(instance, &call)) return fmi2Error;
+    Status status = instance_check_booleans(instance, references, count, values);
+    for (size_t i = 0; i < count && status == STATUS_OK; i++)
+        status = instance_check_boolean(instance, references[i], values[i] != fmi2False);
+    for (size_t i = 0; i < count && status == STATUS_OK; i++)
+        instance_set_boolean(instance, references[i], values[i] != fmi2False);
+    return (fmi2Status)status;
+}
+
+#endif
+
 fmi2Status fmi2DoStep(fmi2Component instance, fmi2Real time, fmi2Real step_size,
                       fmi2Boolean no_set_state_before_now) {
     (void)no_set_state_before_now;
@@ -236,7 +262,7 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component instance, const fmi2Byte bytes[
 
 fmi2Status fmi2EnterEventMode(fmi2Component instance) {
     if (!instance || !instance_admits(instance, &ENTER_EVENT)) return fmi2Error;
-    ((Instance *)instance)->now.state = EVENT;
+    instance_enter_event(instance);
     return fmi2OK;
 }
 
@@ -244,7 +270,10 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component instance, fmi2EventInfo *info) {
     if (!instance || !instance_admits(instance, &NEW_DISCRETE)) return fmi2Error;
     if (!info) return (fmi2Status)instance_error(instance, "the event info is NULL");
     memset(info, 0, sizeof *info);
-    return (fmi2Status)composite_refresh(instance);
+    bool states_changed;
+    const Status status = instance_update_discrete(instance, &states_changed);
+    if (states_changed) info->valuesOfContinuousStatesChanged = fmi2True;
+    return (fmi2Status)status;
 }
 
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component instance) {

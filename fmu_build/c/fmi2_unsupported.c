@@ -13,14 +13,22 @@ static fmi2Status unsupported(Instance *instance, const Call *call) {
     return (fmi2Status)instance_error(instance, "belongs to a capability that this FMU does not have");
 }
 
-/* Every variable is a Real: any reference given to another type's function is wrong. */
+#if DOCKED_COUNT
+#define BOOLEAN(X)
+#define TYPES "all variables are Real or Boolean"
+#else
+#define BOOLEAN(X) X(Boolean)
+#define TYPES "all variables are Real"
+#endif
+
+/* Any reference given to another type's function is wrong. */
 static fmi2Status other_type(Instance *instance, const Call *call, size_t count) {
     if (!instance || !instance_admits(instance, call)) return fmi2Error;
     if (count == 0) return fmi2OK;
-    return (fmi2Status)instance_error(instance, "all variables are Real, none has this type");
+    return (fmi2Status)instance_error(instance, TYPES ", none has this type");
 }
 
-#define OTHER_TYPES(X) X(Integer) X(Boolean) X(String)
+#define OTHER_TYPES(X) X(Integer) BOOLEAN(X) X(String)
 
 #define DEFINE_ACCESSORS(TYPE)                                                                            \
     fmi2Status fmi2Get##TYPE(fmi2Component instance, const fmi2ValueReference references[], size_t count, \

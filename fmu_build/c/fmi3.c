@@ -10,6 +10,13 @@
 
 enum { REPORT_SIZE = 256 };
 
+/* Co-simulation has an event mode where docks open and close. */
+enum {
+    HAS_EVENT_MODE = DOCKED_COUNT > 0,
+    EVENT_FOLLOWS = HAS_EVENT_MODE ? STEPPING | CONTINUOUS : CONTINUOUS,
+    ONLY_EXCHANGE = HAS_EVENT_MODE ? ONLY_MODEL_EXCHANGE : 0
+};
+
 enum {
     OUTSIDE_CALLBACK = ANY_STATE & ~INTERMEDIATE,
     STARTED = INITIALIZATION | RUNNING | TERMINATED,
@@ -38,11 +45,11 @@ static const Call FREE_STATE = {"fmi3FreeFMUState", OUTSIDE_CALLBACK, STATUS_ERR
 static const Call STATE_SIZE = {"fmi3SerializedFMUStateSize", OUTSIDE_CALLBACK, STATUS_ERROR};
 static const Call SERIALIZE = {"fmi3SerializeFMUState", OUTSIDE_CALLBACK, STATUS_ERROR};
 static const Call DESERIALIZE = {"fmi3DeserializeFMUState", OUTSIDE_CALLBACK, STATUS_ERROR};
-static const Call ENTER_EVENT = {"fmi3EnterEventMode", CONTINUOUS, STATUS_ERROR};
+static const Call ENTER_EVENT = {"fmi3EnterEventMode", EVENT_FOLLOWS, STATUS_ERROR};
 static const Call UPDATE_DISCRETE = {"fmi3UpdateDiscreteStates", EVENT, STATUS_DISCARD};
-static const Call ENTER_CONTINUOUS = {"fmi3EnterContinuousTimeMode", EVENT, STATUS_ERROR};
+static const Call ENTER_CONTINUOUS = {"fmi3EnterContinuousTimeMode", ONLY_EXCHANGE | EVENT, STATUS_ERROR};
 static const Call COMPLETED_STEP = {"fmi3CompletedIntegratorStep", CONTINUOUS, STATUS_ERROR};
-static const Call SET_TIME = {"fmi3SetTime", CONTINUOUS | EVENT, STATUS_DISCARD};
+static const Call SET_TIME = {"fmi3SetTime", ONLY_EXCHANGE | CONTINUOUS | EVENT, STATUS_DISCARD};
 static const Call SET_STATES = {"fmi3SetContinuousStates", CONTINUOUS, STATUS_DISCARD};
 static const Call GET_STATES = {"fmi3GetContinuousStates", INTEGRATED, STATUS_DISCARD};
 static const Call GET_RATES = {"fmi3GetContinuousStateDerivatives", INTEGRATED, STATUS_DISCARD};
@@ -107,9 +114,10 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi
     return instantiate(&INSTANTIATE_ME, name, token, logging_on, environment, log_message);
 }
 
-/* Whether event mode is not asked for and the variables to be read within a step are outputs. */
+/* Whether there is event mode if it is asked for, and the variables to be read within a step are outputs. */
 static const char *co_simulation_problem(bool event_mode_used, const fmi3ValueReference variables[], size_t count) {
-    if (event_mode_used) return "eventModeUsed is true, but this FMU has no event mode (hasEventMode is false)";
+    if (event_mode_used && !HAS_EVENT_MODE)
+        return "eventModeUsed is true, but this FMU has no event mode (hasEventMode is false)";
     if (count > 0 && !variables) return "requiredIntermediateVariables is NULL";
     for (size_t i = 0; i < count; i++)
         if (variables[i] >= VARIABLE_COUNT || VARIABLES[variables[i]].role != ROLE_OUTPUT)
@@ -131,6 +139,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
     }
     Instance *instance = instantiate(&INSTANTIATE_CS, name, token, logging_on, environment, log_message);
     if (!instance) return NULL;
+    if (HAS_EVENT_MODE) instance->event_mode_used = event_mode_used;
     instance->early_return_allowed = early_return_allowed;
     instance->sub_step_callback = (void (*)(void))intermediate_update;
     instance->sub_step_ended = intermediate_update ? sub_step_ended : NULL;
@@ -161,7 +170,10 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance instance) {
     if (!instance || !instance_admits(instance, &EXIT_INITIALIZATION)) return fmi3Error;
-    return (fmi3Status)instance_exit_initialization(instance);
+    const Status status = instance_exit_initialization(instance);
+    if (HAS_EVENT_MODE && status == STATUS_OK && ((Instance *)instance)->event_mode_used)
+        ((Instance *)instance)->now.state = EVENT;
+    return (fmi3Status)status;
 }
 
 fmi3Status fmi3Terminate(fmi3Instance instance) {
@@ -176,23 +188,58 @@ fmi3Status fmi3Reset(fmi3Instance instance) {
     return fmi3OK;
 }
 
+static fmi3Status wrong_size(Instance *instance, size_t value_count, size_t count) {
+    return (fmi3Status)instance_error(instance, "nValues = %zu: must be nValueReferences = %zu", value_count, count);
+}
+
 fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference references[], size_t count,
                           fmi3Float64 values[], size_t value_count) {
     if (!instance || !instance_admits(instance, &GET_FLOAT64)) return fmi3Error;
-    if (value_count != count)
-        return (fmi3Status)instance_error(instance, "nValues = %zu: must be nValueReferences = %zu", value_count,
-                                          count);
+    if (value_count != count) return wrong_size(instance, value_count, count);
     return (fmi3Status)instance_get(instance, references, count, values);
 }
 
 fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference references[], size_t count,
                           const fmi3Float64 values[], size_t value_count) {
     if (!instance || !instance_admits(instance, &SET_FLOAT64)) return fmi3Error;
-    if (value_count != count)
-        return (fmi3Status)instance_error(instance, "nValues = %zu: must be nValueReferences = %zu", value_count,
-                                          count);
+    if (value_count != count) return wrong_size(instance, value_count, count);
     return (fmi3Status)instance_set(instance, references, count, values);
 }
+
+#if DOCKED_COUNT
+
+fmi3Status fmi3GetBoolean(fmi3Instance instance, const fmi3ValueReference references[], size_t count,
+                          fmi3Boolean values[], size_t value_count) {
+    static const Call call = {"fmi3GetBoolean", ANY_STATE, STATUS_ERROR};
+    if (!instance || !instance_admits(instance, &call)) return fmi3Error;
+    if (value_count != count) return wrong_size(instance, value_count, count);
+    const Status status = instance_check_booleans(instance, references, count, values);
+    for (size_t i = 0; i < count && status == STATUS_OK; i++)
+        values[i] = instance_get_boolean(instance, references[i]);
+    return (fmi3Status)status;
+}
+
+fmi3Status fmi3SetBoolean(fmi3Instance instance, const fmi3ValueReference references[], size_t count,
+                          const fmi3Boolean values[], size_t value_count) {
+    static const Call call = {"fmi3SetBoolean", BEFORE_START | RUNNING, STATUS_ERROR};
+    if (!instance || !instance_admits(instance, &call)) return fmi3Error;
+    if (value_count != count) return wrong_size(instance, value_count, count);
+    Status status = instance_check_booleans(instance, references, count, values);
+    for (size_t i = 0; i < count && status == STATUS_OK; i++)
+        status = instance_check_boolean(instance, references[i], values[i]);
+    for (size_t i = 0; i < count && status == STATUS_OK; i++)
+        instance_set_boolean(instance, references[i], values[i]);
+    return (fmi3Status)status;
+}
+
+fmi3Status fmi3EnterStepMode(fmi3Instance instance) {
+    static const Call call = {"fmi3EnterStepMode", ONLY_CO_SIMULATION | EVENT, STATUS_ERROR};
+    if (!instance || !instance_admits(instance, &call)) return fmi3Error;
+    ((Instance *)instance)->now.state = STEPPING;
+    return fmi3OK;
+}
+
+#endif
 
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 time, fmi3Float64 step_size,
                       fmi3Boolean no_set_state_before_now, fmi3Boolean *event_handling_needed,
@@ -213,9 +260,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 time, fmi3Float64 step_
 fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueReference references[], size_t count,
                                     const fmi3Int32 orders[], fmi3Float64 values[], size_t value_count) {
     if (!instance || !instance_admits(instance, &GET_OUTPUT_DERIVATIVES)) return fmi3Error;
-    if (value_count != count)
-        return (fmi3Status)instance_error(instance, "nValues = %zu: must be nValueReferences = %zu", value_count,
-                                          count);
+    if (value_count != count) return wrong_size(instance, value_count, count);
     return (fmi3Status)derivatives_of_time(instance, references, count, orders, values);
 }
 
@@ -272,7 +317,9 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte bytes[]
 
 fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
     if (!instance || !instance_admits(instance, &ENTER_EVENT)) return fmi3Error;
-    ((Instance *)instance)->now.state = EVENT;
+    if (HAS_EVENT_MODE && ((Instance *)instance)->now.state == STEPPING && !((Instance *)instance)->event_mode_used)
+        return (fmi3Status)instance_error(instance, "eventModeUsed was false when the instance was made");
+    instance_enter_event(instance);
     return fmi3OK;
 }
 
@@ -284,7 +331,10 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *need_upd
         !next_event_time)
         return (fmi3Status)instance_error(instance, "an argument for a result is NULL");
     *need_update = *terminate = *nominals_changed = *values_changed = *next_event_time_defined = fmi3False;
-    return (fmi3Status)composite_refresh(instance);
+    bool states_changed;
+    const Status status = instance_update_discrete(instance, &states_changed);
+    if (states_changed) *values_changed = fmi3True;
+    return (fmi3Status)status;
 }
 
 fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance) {

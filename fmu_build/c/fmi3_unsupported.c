@@ -13,15 +13,25 @@ static fmi3Status unsupported(Instance *instance, const Call *call) {
     return (fmi3Status)instance_error(instance, "belongs to a capability that this FMU does not have");
 }
 
-/* Every variable is a Float64: any reference given to another type's function is wrong. */
+#if DOCKED_COUNT
+#define BOOLEAN(X)
+#define STEP_MODE(X)
+#define TYPES "all variables are Float64 or Boolean"
+#else
+#define BOOLEAN(X) X(Boolean)
+#define STEP_MODE(X) X(EnterStepMode, (fmi3Instance instance))
+#define TYPES "all variables are Float64"
+#endif
+
+/* Any reference given to another type's function is wrong. */
 static fmi3Status other_type(Instance *instance, const Call *call, size_t count) {
     if (!instance || !instance_admits(instance, call)) return fmi3Error;
     if (count == 0) return fmi3OK;
-    return (fmi3Status)instance_error(instance, "all variables are Float64, none has this type");
+    return (fmi3Status)instance_error(instance, TYPES ", none has this type");
 }
 
 #define OTHER_TYPES(X) \
-    X(Float32) X(Int8) X(UInt8) X(Int16) X(UInt16) X(Int32) X(UInt32) X(Int64) X(UInt64) X(Boolean) X(String)
+    X(Float32) X(Int8) X(UInt8) X(Int16) X(UInt16) X(Int32) X(UInt32) X(Int64) X(UInt64) BOOLEAN(X) X(String)
 
 #define DEFINE_ACCESSORS(TYPE)                                                                           \
     fmi3Status fmi3Get##TYPE(fmi3Instance instance, const fmi3ValueReference references[], size_t count, \
@@ -99,7 +109,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token
     X(SetShiftFraction, (fmi3Instance instance, const fmi3ValueReference references[], size_t count,               \
                          const fmi3UInt64 counters[], const fmi3UInt64 resolutions[]))                             \
     X(EvaluateDiscreteStates, (fmi3Instance instance))                                                             \
-    X(EnterStepMode, (fmi3Instance instance))                                                                      \
+    STEP_MODE(X)                                                                                                   \
     X(ActivateModelPartition, (fmi3Instance instance, fmi3ValueReference clock, fmi3Float64 time))
 
 #define DEFINE_UNSUPPORTED(NAME, PARAMETERS)                              \

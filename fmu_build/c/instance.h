@@ -27,7 +27,7 @@ typedef enum {
     INITIALIZATION = 2,
     STEPPING = 4,        /* co-simulation, between steps */
     INTERMEDIATE = 8,    /* co-simulation, in the importer's callback within a step */
-    EVENT = 16,          /* model exchange */
+    EVENT = 16,          /* model exchange; co-simulation whose importer uses event mode */
     CONTINUOUS = 32,     /* model exchange */
     TERMINATED = 64,
     BEFORE_START = INSTANTIATED | INITIALIZATION,
@@ -63,10 +63,18 @@ typedef struct {
     double stop_time;                 /* s, meaningful if stop_time_defined */
     double tolerance;                 /* the importer's or the scene's */
     double error_estimate;            /* rad, of the last communication step */
+#if STATE_IS_MOMENTUM
+    double x[STATE_COUNT];            /* attitude and angular velocity; the states hold the momentum */
+    double kept_momentum[3];          /* N.m.s, of the states when changes were committed last */
+#endif
+#if CHANGES
+    double kept_rate[3];              /* rad/s, when changes were committed last, with stepped_p */
+    double kept_c[COMPOSITE_COUNT];   /* the composite of stepped_p */
+#endif
     double p[INPUT_P_COUNT + 1];      /* the composite's inputs, directions scaled; + 1: may be none */
     double c[COMPOSITE_COUNT];        /* the composite of p */
     double a[AXES_COUNT + 1];         /* moments, axes and the like of c */
-    double stepped_p[INPUT_P_COUNT + 1]; /* p of the last communication step, at first of the start */
+    double stepped_p[INPUT_P_COUNT + 1]; /* p of the last communication step or event, at first of the start */
     double epoch[STATE_COUNT];        /* the state that free motion is counted from */
     double elapsed, elapsed_rest;     /* s since then, as an unevaluated sum */
     unsigned state;                   /* a State */
@@ -88,6 +96,7 @@ struct Instance {
     Dynamics now;
     bool outputs_are_current;         /* the outputs in now.values follow from states, inputs and now.c */
     bool rates_are_current;           /* so do the rates */
+    bool mirror_is_current;           /* where the states hold the momentum: x and they agree */
     Variation variation;
     const double *arg[WORK_ARG];
     double *res[WORK_RES];
@@ -102,6 +111,7 @@ struct Instance {
     void (*sub_step_callback)(void);  /* the importer's, of the type that sub_step_ended knows */
     bool early_return_allowed;
     bool within_step;                 /* in the importer's callback: most calls have to wait */
+    bool event_mode_used;             /* in co-simulation */
     unsigned log_categories;
     char name[];                      /* the importer's name of the instance */
 };
@@ -129,7 +139,8 @@ void instance_inform(Instance *instance, LogCategory category, const char *forma
 /* Turns categories on by name (count 0: all of them) or, with on == false, everything off. */
 Status instance_set_logging(Instance *instance, bool on, size_t count, const char *const names[]);
 
-/* Where states (attitude w, x, y, z; angular velocity, rad/s) and their rates stand among the values. */
+/* Where the FMU's states (attitude w, x, y, z; angular velocity, rad/s, or momentum, N.m.s) and their rates stand among
+   the values. */
 static inline double *instance_states(Instance *instance) {
     return &instance->now.values[REFERENCE_STATES];
 }
@@ -137,9 +148,18 @@ static inline double *instance_rates(Instance *instance) {
     return &instance->now.values[REFERENCE_DERIVATIVES];
 }
 
+/* Attitude and angular velocity. */
+static inline double *instance_x(Instance *instance) {
+#if STATE_IS_MOMENTUM
+    return instance->now.x;
+#else
+    return instance_states(instance);
+#endif
+}
+
 /* Points the first arguments of the model's functions to x, u, c, a, and the estimate. */
 static inline void instance_set_arguments(Instance *instance) {
-    instance->arg[0] = instance_states(instance);
+    instance->arg[0] = instance_x(instance);
     instance->arg[1] = &instance->now.values[REFERENCE_TORQUE];
     instance->arg[2] = instance->now.c;
     instance->arg[3] = instance->now.a;
@@ -153,6 +173,12 @@ Status instance_set_experiment(Instance *instance, bool tolerance_defined, doubl
 /* Judges what was set, fixes the state at the start and goes on to STEPPING or EVENT. */
 Status instance_exit_initialization(Instance *instance);
 
+/* Goes on to EVENT; changes of inputs begin from the states as they are. */
+void instance_enter_event(Instance *instance);
+
+/* Ends an iteration of event mode: judges what was set. Whether that changed the states. */
+Status instance_update_discrete(Instance *instance, bool *states_changed);
+
 /* Takes the states at the start from the parameters, the attitude at length 1. */
 Status instance_start_attitude(Instance *instance);
 void instance_start_rate(Instance *instance);
@@ -161,6 +187,13 @@ void instance_start_rate(Instance *instance);
 Status instance_get(Instance *instance, const unsigned references[], size_t count, double values[]);
 Status instance_set(Instance *instance, const unsigned references[], size_t count, const double values[]);
 Status instance_check_references(Instance *instance, const unsigned references[], size_t count);
+
+/* variables.c, where the scene has Booleans, all of them inputs: whether these references are such, and whether one
+   may be set to a value now: outside event mode it must keep the one it has. Then get and set cannot fail. */
+Status instance_check_booleans(Instance *instance, const unsigned references[], size_t count, const void *values);
+Status instance_check_boolean(Instance *instance, unsigned reference, bool value);
+bool instance_get_boolean(const Instance *instance, unsigned reference);
+void instance_set_boolean(Instance *instance, unsigned reference, bool value);
 
 /* Whether the state has an attitude that can be brought to unit length; a solver may have lost it. */
 Status instance_check_attitude(Instance *instance);
@@ -174,6 +207,9 @@ Status instance_get_nominals(Instance *instance, double nominals[], size_t count
 
 /* composite.c: makes c follow from the inputs, unless it does: judges them and computes the composite. */
 Status composite_refresh(Instance *instance);
+
+/* Computes and judges the composite c of inputs p. */
+Status composite_compute(Instance *instance, const double p[], double c[]);
 
 /* Makes a follow from c, unless it does. */
 void composite_refresh_axes(Instance *instance);

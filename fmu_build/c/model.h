@@ -5,16 +5,27 @@
 
 int composite(const double **arg, double **res, int *iw, double *w, int mem);         /* p -> c */
 int axes(const double **arg, double **res, int *iw, double *w, int mem);              /* c -> a */
-int ode(const double **arg, double **res, int *iw, double *w, int mem);               /* x, u, c -> rate of x */
+int ode(const double **arg, double **res, int *iw, double *w, int mem);               /* z, u, c -> rate of z */
 int outputs(const double **arg, double **res, int *iw, double *w, int mem);           /* x, u, c, a, e -> y */
 int composite_forward(const double **arg, double **res, int *iw, double *w, int mem); /* p, dp -> dc */
 int composite_reverse(const double **arg, double **res, int *iw, double *w, int mem); /* p, wc -> wp */
 
-/* x, u, c, a, dx, du, dc -> d rate, dy */
+/* z, u, c, a, dz, du, dc -> d rate, dy; z are the FMU's states: x, or attitude and momentum */
 int response_forward(const double **arg, double **res, int *iw, double *w, int mem);
 
-/* x, u, c, a, w rate, wy -> wx, wu, wc */
+/* z, u, c, a, w rate, wy -> wz, wu, wc */
 int response_reverse(const double **arg, double **res, int *iw, double *w, int mem);
+
+/* Of these a scene has those that its changes need. */
+int momentum_of(const double **arg, double **res, int *iw, double *w, int mem);       /* omega, c -> momentum */
+int momentum_of_forward(const double **arg, double **res, int *iw, double *w, int mem);
+int momentum_of_reverse(const double **arg, double **res, int *iw, double *w, int mem);
+int rate_of_momentum(const double **arg, double **res, int *iw, double *w, int mem);  /* momentum, c -> omega */
+int keep_momentum(const double **arg, double **res, int *iw, double *w, int mem);     /* omega, c, d -> omega */
+int keep_momentum_forward(const double **arg, double **res, int *iw, double *w, int mem);
+int keep_momentum_reverse(const double **arg, double **res, int *iw, double *w, int mem);
+int contact_momentum(const double **arg, double **res, int *iw, double *w, int mem);  /* p, k -> momentum */
+int docked_rate(const double **arg, double **res, int *iw, double *w, int mem);       /* omega, momentum, d -> omega */
 
 /* Of these a scene has those that its propagator uses. */
 int fastest_square(const double **arg, double **res, int *iw, double *w, int mem);    /* x, u, c -> rad2/s2 */

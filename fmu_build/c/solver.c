@@ -82,7 +82,7 @@ static bool is_finite(const double x[]) {
 
 /* Takes one sub-step of at most the model's longest, what remains being shared out evenly. */
 static Status sub_step(Instance *instance, Progress *progress) {
-    double *x = instance_states(instance);
+    double *x = instance_x(instance);
     double square, next[STATE_COUNT], error[2] = {0.0, 0.0};
     instance_set_arguments(instance);
     instance->res[0] = &square;
@@ -139,7 +139,7 @@ static Status take_step(Instance *instance, int exponent, double size, double ne
     instance->arg[1] = instance->now.c;
     instance->res[0] = acceleration;
     by_torque(instance->arg, instance->res, instance->iw, instance->w, 0);
-    taylor_step(instance_states(instance), acceleration, &instance->now.a[AXES_SERIES], size, exponent - 1, next,
+    taylor_step(instance_x(instance), acceleration, &instance->now.a[AXES_SERIES], size, exponent - 1, next,
                 error);
     return STATUS_OK;
 }
@@ -162,7 +162,7 @@ static void call_step(Instance *instance, const double x[], double size, double 
 
 static Status take_step(Instance *instance, int exponent, double size, double next[], double error[2]) {
     (void)exponent;
-    call_step(instance, instance_states(instance), size, next, error);
+    call_step(instance, instance_x(instance), size, next, error);
 #if FREE == FREE_BETWEEN_KICKS
     double kicked[STATE_COUNT], drifted[STATE_COUNT], again[2];
     memcpy(kicked, next, sizeof kicked);
@@ -185,7 +185,7 @@ static double first_size(Instance *instance, const Progress *progress) {
     instance_set_arguments(instance);
     instance->res[0] = rates;
     ode(instance->arg, instance->res, instance->iw, instance->w, 0);
-    const double speed = length_of(instance_states(instance) + 4) + sqrt(length_of(rates + 4));
+    const double speed = length_of(instance_x(instance) + 4) + sqrt(length_of(rates + 4));
     if (speed * progress->h <= 0.02) return progress->h;
     return 2.0 * pow(instance->now.tolerance, 1.0 / progress->exponent) / speed;
 #endif
@@ -195,7 +195,7 @@ static double first_size(Instance *instance, const Progress *progress) {
    tolerance by time, or within what rounding amounts to there; one that misses it is taken again, shorter. An error of
    the rate turns the body on for what remains, but counts no less than relative to the rate. */
 static Status sub_step(Instance *instance, Progress *progress) {
-    double *x = instance_states(instance), next[STATE_COUNT], error[2];
+    double *x = instance_x(instance), next[STATE_COUNT], error[2];
     if (progress->next_size == 0.0) {
         progress->exponent = error_exponent(instance);
         progress->next_size = first_size(instance, progress);
@@ -241,14 +241,40 @@ static bool is_free(const Instance *instance) {
     const double *torque = &instance->now.values[REFERENCE_TORQUE];
     bool zero = true;
     for (size_t i = INPUT_U_COUNT; i > 0; i--) zero = zero && torque[i - 1] == 0.0;
+#if SPINS
+    for (size_t i = 0; i < 3; i++) zero = zero && instance->now.c[COMPOSITE_SPIN + i] == 0.0;
+#endif
     return zero;
 }
+
+#if FREE == FREE_ALWAYS
+
+/* Names what keeps the motion from being free. */
+static Status refuse_action(Instance *instance) {
+    static const char reason[] = "must be 0 for the propagator exact, which knows free motion alone";
+    for (size_t i = REFERENCE_TORQUE; i < REFERENCE_TORQUE + INPUT_U_COUNT; i += 3) {
+        const double *v = &instance->now.values[i];
+        if (v[0] == 0.0 && v[1] == 0.0 && v[2] == 0.0) continue;
+        const Variable *variable = &VARIABLES[i];
+        return instance_refuse(instance, "%.*s = (%.10g, %.10g, %.10g) %s: %s", (int)strcspn(variable->name, "["),
+                               variable->name, v[0], v[1], v[2], variable->unit, reason);
+    }
+#if SPINS
+    const double *h = &instance->now.c[COMPOSITE_SPIN];
+    return instance_refuse(instance, "the ports that move give the vessels (%.10g, %.10g, %.10g) N.m.s: %s", h[0], h[1],
+                           h[2], reason);
+#else
+    return STATUS_OK;
+#endif
+}
+
+#endif
 
 /* Takes the whole step from where the motion became free, so that rounding does not pile up over steps; or, if that is
    too many turns away, from now on. */
 static Status free_step(Instance *instance, Progress *progress) {
     Dynamics *now = &instance->now;
-    double *x = instance_states(instance), next[STATE_COUNT], elapsed = progress->h, rest = 0.0;
+    double *x = instance_x(instance), next[STATE_COUNT], elapsed = progress->h, rest = 0.0;
     const double speed = length_of(x + 4);
     if (!(speed * progress->h <= LARGEST_TURN))
         return instance_refuse(instance,
@@ -281,11 +307,7 @@ static Status advance(Instance *instance, Progress *progress) {
 #if FREE == FREE_ALWAYS
     progress->was_free = is_free(instance);
     if (progress->was_free) return free_step(instance, progress);
-    const double *torque = &instance->now.values[REFERENCE_TORQUE];
-    return instance_refuse(instance,
-                           "torque = (%.10g, %.10g, %.10g) N.m: must be 0 for the propagator exact, which knows free "
-                           "motion alone",
-                           torque[0], torque[1], torque[2]);
+    return refuse_action(instance);
 #elif FREE == FREE_WHILE_FREE
     progress->was_free = !progress->composite_changed && is_free(instance);
     return progress->was_free ? free_step(instance, progress) : sub_step(instance, progress);
@@ -317,14 +339,14 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
     progress.composite_changed = memcmp(now->p, now->stepped_p, sizeof now->p) != 0;
     double start[STATE_COUNT], end = time + h;
     const double start_time = now->values[REFERENCE_TIME], start_error = now->error_estimate;
-    memcpy(start, instance_states(instance), sizeof start);
+    memcpy(start, instance_x(instance), sizeof start);
     const Call *call = instance->call;
     while (progress.remaining > 0.0) {
         instance->call = call;
         status = advance(instance, &progress);
         instance->outputs_are_current = instance->rates_are_current = false;
         if (status != STATUS_OK) {
-            memcpy(instance_states(instance), start, sizeof start);
+            memcpy(instance_x(instance), start, sizeof start);
             now->values[REFERENCE_TIME] = start_time;
             now->error_estimate = start_error;
             return status;
@@ -341,6 +363,11 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
         }
     }
     now->epoch_holds = progress.was_free;
+#if CHANGES
+    memcpy(now->kept_rate, instance_x(instance) + 4, sizeof now->kept_rate);
+    if (progress.composite_changed) memcpy(now->kept_c, now->c, sizeof now->kept_c);
+    instance->mirror_is_current = false;
+#endif
     memcpy(now->stepped_p, now->p, sizeof now->p);
     return STATUS_OK;
 }

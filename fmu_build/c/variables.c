@@ -1,15 +1,37 @@
 #include <math.h>
 #include <string.h>
 
-#include "instance.h"
+#include "changes.h"
 #include "model.h"
 
 /* Squares of the attitude's length beyond which it cannot be brought to unit length. */
 static const double SMALLEST_SQUARE = 1e-200;
 static const double LARGEST_SQUARE = 1e200;
 
+/* x and the states agree from here on. */
+static void mirror(Instance *instance) {
+#if STATE_IS_MOMENTUM
+    changes_mirror(instance);
+#else
+    (void)instance;
+#endif
+}
+
 static Status unknown_reference(Instance *instance, unsigned reference) {
     return instance_error(instance, "value reference %u is unknown; the largest is %d", reference, VARIABLE_COUNT - 1);
+}
+
+static bool is_boolean(unsigned reference) {
+#if DOCKED_COUNT
+    return VARIABLES[reference].type == TYPE_BOOLEAN;
+#else
+    (void)reference;
+    return false;
+#endif
+}
+
+static Status refuse_boolean(Instance *instance, unsigned reference) {
+    return instance_error(instance, "%s is a Boolean, not a number", VARIABLES[reference].name);
 }
 
 Status instance_check_references(Instance *instance, const unsigned references[], size_t count) {
@@ -21,7 +43,8 @@ Status instance_check_references(Instance *instance, const unsigned references[]
 }
 
 Status instance_check_attitude(Instance *instance) {
-    const double *q = instance_states(instance);
+    mirror(instance);
+    const double *q = instance_x(instance);
     const double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
     if (!(square >= SMALLEST_SQUARE && square <= LARGEST_SQUARE))
         return instance_refuse(instance, "state.attitude = (%.10g, %.10g, %.10g, %.10g): its length must be about 1",
@@ -42,7 +65,9 @@ static Status refresh_outputs(Instance *instance) {
 
 static Status refresh_rates(Instance *instance) {
     if (instance->rates_are_current) return STATUS_OK;
+    mirror(instance);
     instance_set_arguments(instance);
+    instance->arg[0] = instance_states(instance);
     instance->res[0] = instance_rates(instance);
     ode(instance->arg, instance->res, instance->iw, instance->w, 0);
     instance->rates_are_current = true;
@@ -58,6 +83,7 @@ static Status prepare(Instance *instance, unsigned wanted) {
         if (wanted & FOLLOWS_ATTITUDE) status = instance_start_attitude(instance);
     }
     if (status == STATUS_OK && (wanted & FOLLOWS_COMPOSITE)) status = composite_refresh(instance);
+    if (status == STATUS_OK && (wanted & FOLLOWS_STATES)) mirror(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_AXES)) composite_refresh_axes(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_OUTPUTS)) status = refresh_outputs(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_RATES)) status = refresh_rates(instance);
@@ -74,6 +100,7 @@ Status instance_get(Instance *instance, const unsigned references[], size_t coun
     unsigned wanted = 0;
     for (size_t i = 0; i < count; i++) {
         if (references[i] >= VARIABLE_COUNT) return unknown_reference(instance, references[i]);
+        if (is_boolean(references[i])) return refuse_boolean(instance, references[i]);
         wanted |= VARIABLES[references[i]].follows;
     }
     const Status status = prepare(instance, wanted);
@@ -108,14 +135,15 @@ static Status refuse_not_finite(Instance *instance, const Variable *variable, do
                            variable->unit[0] ? " " : "", variable->unit);
 }
 
-/* Inputs stand together: those of the composite, then the torque. */
+/* Inputs stand together: those of the composite, the motion at contact, what acts; the parameters follow. */
 static bool is_input(unsigned reference) {
-    return reference >= REFERENCE_P && reference < REFERENCE_P + INPUT_P_COUNT + INPUT_U_COUNT;
+    return reference >= REFERENCE_P && reference < REFERENCE_TORQUE + INPUT_U_COUNT;
 }
 
 /* Whether a value may be stored: known, settable in this state, finite. */
 static Status check_set(Instance *instance, unsigned reference, double value) {
     if (reference >= VARIABLE_COUNT) return unknown_reference(instance, reference);
+    if (is_boolean(reference)) return refuse_boolean(instance, reference);
     const Variable *variable = &VARIABLES[reference];
     if (variable->role != ROLE_INPUT) {
         const Status status = check_settable(instance, variable);
@@ -125,26 +153,68 @@ static Status check_set(Instance *instance, unsigned reference, double value) {
     return refuse_not_finite(instance, variable, value);
 }
 
+/* The states lead now: a change of inputs goes on from them. */
+static void states_were_set(Instance *instance) {
+    instance->outputs_are_current = instance->rates_are_current = instance->mirror_is_current = false;
+#if CHANGES
+    if (instance->now.state == EVENT) changes_commit(instance);
+#endif
+}
+
 Status instance_set(Instance *instance, const unsigned references[], size_t count, const double values[]) {
     if (count == 0) return STATUS_OK;
     if (!references || !values) return instance_error(instance, "an array is NULL");
     for (size_t i = 0; i < count; i++) {
-        if (is_input(references[i]) && isfinite(values[i])) continue;
+        if (is_input(references[i]) && !is_boolean(references[i]) && isfinite(values[i])) continue;
         const Status status = check_set(instance, references[i], values[i]);
         if (status != STATUS_OK) return status;
     }
-    bool changed = false, shape_changed = false;
+    bool changed = false, shape_changed = false, states_changed = false;
     for (size_t i = 0; i < count; i++) {
         double *value = &instance->now.values[references[i]];
         if (*value == values[i]) continue;
         *value = values[i];
         changed = true;
         shape_changed = shape_changed || references[i] < REFERENCE_TORQUE;
+        states_changed = states_changed || references[i] >= REFERENCE_STATES;
     }
+    if (states_changed) states_were_set(instance);
     if (changed) instance->outputs_are_current = instance->rates_are_current = false;
     if (shape_changed) instance->now.composite_is_current = false;
     return STATUS_OK;
 }
+
+#if DOCKED_COUNT
+
+Status instance_check_booleans(Instance *instance, const unsigned references[], size_t count, const void *values) {
+    if (count == 0) return STATUS_OK;
+    if (!references || !values) return instance_error(instance, "an array is NULL");
+    for (size_t i = 0; i < count; i++) {
+        if (references[i] >= VARIABLE_COUNT) return unknown_reference(instance, references[i]);
+        if (!is_boolean(references[i]))
+            return instance_error(instance, "%s is a number, not a Boolean", VARIABLES[references[i]].name);
+    }
+    return STATUS_OK;
+}
+
+Status instance_check_boolean(Instance *instance, unsigned reference, bool value) {
+    const unsigned held = instance->event_mode_used ? STEPPING | CONTINUOUS : CONTINUOUS;
+    if (!(instance->now.state & held) || value == instance_get_boolean(instance, reference)) return STATUS_OK;
+    return instance_error(instance, "%s is discrete: once initialisation is left, it can be changed in event mode only",
+                          VARIABLES[reference].name);
+}
+
+bool instance_get_boolean(const Instance *instance, unsigned reference) {
+    return instance->now.values[reference] != 0.0;
+}
+
+void instance_set_boolean(Instance *instance, unsigned reference, bool value) {
+    if (value == instance_get_boolean(instance, reference)) return;
+    instance->now.values[reference] = value ? 1.0 : 0.0;
+    instance->now.composite_is_current = instance->outputs_are_current = instance->rates_are_current = false;
+}
+
+#endif
 
 Status instance_set_time(Instance *instance, double time) {
     if (!isfinite(time)) return instance_refuse(instance, "time = %.10g s: must be finite", time);
@@ -161,7 +231,7 @@ static Status check_states(Instance *instance, const void *array, size_t count) 
 
 Status instance_get_states(Instance *instance, double states[], size_t count) {
     Status status = check_states(instance, states, count);
-    if (status == STATUS_OK) status = prepare(instance, FOLLOWS_STATES | FOLLOWS_ATTITUDE);
+    if (status == STATUS_OK) status = prepare(instance, VARIABLES[REFERENCE_STATES + 4].follows | FOLLOWS_ATTITUDE);
     if (status == STATUS_OK) memcpy(states, instance_states(instance), STATE_COUNT * sizeof(double));
     return status;
 }
@@ -173,7 +243,7 @@ Status instance_set_states(Instance *instance, const double states[], size_t cou
         if (!isfinite(states[i]))
             return refuse_not_finite(instance, &VARIABLES[REFERENCE_STATES + i], states[i]);
     memcpy(instance_states(instance), states, STATE_COUNT * sizeof(double));
-    instance->outputs_are_current = instance->rates_are_current = false;
+    states_were_set(instance);
     return STATUS_OK;
 }
 

@@ -6,6 +6,8 @@
 
 #include "scene.h"
 
+typedef enum { TYPE_NUMBER, TYPE_BOOLEAN } Type;
+
 typedef enum { ROLE_TIME, ROLE_INPUT, ROLE_PARAMETER, ROLE_OUTPUT, ROLE_STATE, ROLE_DERIVATIVE } Role;
 
 /* What a value must be beside finite. A check stands at the first element of what is judged together. */
@@ -34,6 +36,9 @@ typedef struct {
     Role role;
     Check check;
     unsigned follows;
+#if DOCKED_COUNT
+    Type type; /* the values of a Boolean are 0 and 1 */
+#endif
 } Variable;
 
 /* Indexed by value reference: time, inputs (p, then torque), parameters, outputs, states, derivatives. */

@@ -1,19 +1,30 @@
-"""The dock tree: which vessel hangs on which port of which other, from the root outwards."""
+"""The docks of a scene as a graph: rigid groups of vessels, and the ways by which they hang on the root."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from supervessel.scene import Scene
+from supervessel.scene import Dock, Scene
+
+MOST_WAYS = 64
+"""Ways of docking by which a vessel may hang on the root: each has a pose of its own in the equations."""
+
+
+class TooManyWaysError(ValueError):
+    """A vessel may hang on the root in more than MOST_WAYS ways."""
 
 
 @dataclass(frozen=True)
 class Joint:
-    """A mated pair of ports, seen from the root: the parent is placed before the child."""
+    """A mated pair of ports, seen from the root: the parent is placed before the child.
+
+    dock : name of the input that closes it; None: always closed
+    """
 
     parent: str
     parent_port: str
     child: str
     child_port: str
+    dock: str | None = None
 
     @property
     def ports(self) -> tuple[str, str]:
@@ -21,18 +32,114 @@ class Joint:
         return f"{self.parent}.{self.parent_port}", f"{self.child}.{self.child_port}"
 
 
+@dataclass(frozen=True)
+class Group:
+    """Vessels that are held together by docks always closed, none of whose ports has a pose input.
+
+    reference : the vessel in whose axes the group is put together
+    joints    : the others, parents first
+    """
+
+    reference: str
+    joints: tuple[Joint, ...]
+
+    @property
+    def vessels(self) -> tuple[str, ...]:
+        return (self.reference, *(joint.child for joint in self.joints))
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way by which a group hangs on the root; it counts while every dock on it is closed.
+
+    group  : number of the group
+    joint  : the last on the way; None: the root's own group
+    before : the way of the group that this joint starts from
+    """
+
+    group: int
+    joint: Joint | None = None
+    before: "Way | None" = None
+
+    @property
+    def docks(self) -> tuple[str, ...]:
+        """Names of the inputs that must be true."""
+        if self.joint is None or self.before is None:
+            return ()
+        return self.before.docks + ((self.joint.dock,) if self.joint.dock else ())
+
+    def passes(self, group: int) -> bool:
+        return self.group == group or (self.before is not None and self.before.passes(group))
+
+
 def joints(scene: Scene) -> Iterator[Joint]:
-    """Yields the docks of a scene so that every parent is the root or the child of an earlier joint."""
-    neighbours: dict[str, list[tuple[str, str, str]]] = {vessel: [] for vessel in scene.vessels}
-    for dock in scene.docks:
-        (one, one_port), (other, other_port) = (port.split(".") for port in dock.ports)
-        neighbours[one].append((one_port, other, other_port))
-        neighbours[other].append((other_port, one, one_port))
-    placed, waiting = {scene.root}, [scene.root]
+    """Yields the docks closed at the start so that every parent is the root or an earlier joint's child."""
+    return _spread(scene, scene.root, [dock for dock in scene.docks if dock.docked])
+
+
+def groups(scene: Scene) -> tuple[Group, ...]:
+    """Returns the rigid groups, the root's own first, in the order in which they hang on it."""
+    moving = set(scene.inputs.pose)
+    rigid = [d for d in scene.docks if not switchable(scene, d) and not moving.intersection(d.ports)]
+    found: list[Group] = []
+    taken: set[str] = set()
+    for vessel in (scene.root, *(joint.child for joint in _spread(scene, scene.root, scene.docks))):
+        if vessel not in taken:
+            found.append(Group(vessel, tuple(_spread(scene, vessel, rigid))))
+            taken.update(found[-1].vessels)
+    return tuple(found)
+
+
+def ways(scene: Scene, parts: Sequence[Group]) -> list[list[Way]]:
+    """Returns the ways by which each group may hang on the root.
+
+    Raises TooManyWaysError.
+    """
+    home = {vessel: number for number, part in enumerate(parts) for vessel in part.vessels}
+    found: list[list[Way]] = [[] for _ in parts]
+    waiting = [Way(0)]
     while waiting:
-        parent = waiting.pop(0)
-        for parent_port, child, child_port in neighbours[parent]:
-            if child not in placed:
-                placed.add(child)
-                waiting.append(child)
-                yield Joint(parent, parent_port, child, child_port)
+        way = waiting.pop(0)
+        found[way.group].append(way)
+        if len(found[way.group]) > MOST_WAYS:
+            raise TooManyWaysError(
+                f"docks: {parts[way.group].reference} may hang on the root in more than {MOST_WAYS} ways; "
+                "at most that many are possible"
+            )
+        for vessel in parts[way.group].vessels:
+            for joint in _joints_of(scene, vessel, scene.docks):
+                group = home[joint.child]
+                if not way.passes(group):
+                    waiting.append(Way(group, joint, way))
+    return found
+
+
+def switchable(scene: Scene, dock: Dock) -> bool:
+    """Whether an input opens and closes a dock."""
+    return dock.name is not None and dock.name in scene.inputs.docked
+
+
+def _joints_of(scene: Scene, vessel: str, docks: Sequence[Dock]) -> Iterator[Joint]:
+    """Yields docks of a vessel, seen from it."""
+    for dock in docks:
+        name = dock.name if switchable(scene, dock) else None
+        for here, there in (dock.ports, dock.ports[::-1]):
+            parent, parent_port = here.split(".")
+            if parent == vessel:
+                child, child_port = there.split(".")
+                yield Joint(parent, parent_port, child, child_port, name)
+
+
+def _spread(scene: Scene, start: str, docks: Sequence[Dock]) -> Iterator[Joint]:
+    """Yields joints from a vessel outwards, parents first, each vessel once."""
+    neighbours: dict[str, list[Joint]] = {}
+    for dock in docks:
+        for vessel in {port.partition(".")[0] for port in dock.ports}:
+            neighbours.setdefault(vessel, []).extend(_joints_of(scene, vessel, [dock]))
+    placed, waiting = {start}, [start]
+    while waiting:
+        for joint in neighbours.get(waiting.pop(0), []):
+            if joint.child not in placed:
+                placed.add(joint.child)
+                waiting.append(joint.child)
+                yield joint

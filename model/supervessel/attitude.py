@@ -53,3 +53,24 @@ def rotation_matrix(attitude: ca.SX) -> ca.SX:
         ca.horzcat(x * Y + w * Z, (ww + yy) - (xx + zz), y * Z - w * X),
         ca.horzcat(x * Z - w * Y, y * Z + w * X, (ww + zz) - (xx + yy)),
     )
+
+
+def quaternion(rotation: ca.SX) -> ca.SX:
+    """Returns the unit quaternion, (4,), scalar part >= 0, of a rotation matrix, (3, 3).
+
+    Of the four multiples of the quaternion that the matrix gives the longest is brought to unit length; it jumps
+    to its negative where the body has turned by 180 degrees.
+    """
+    R = rotation
+    x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    xy, zx, yz = R[1, 0] + R[0, 1], R[0, 2] + R[2, 0], R[2, 1] + R[1, 2]
+    best = ca.vertcat(1.0 + R[0, 0] + R[1, 1] + R[2, 2], x, y, z)
+    pivot = best[0]
+    for candidate, size in (
+        (ca.vertcat(x, 1.0 + R[0, 0] - R[1, 1] - R[2, 2], xy, zx), 1),
+        (ca.vertcat(y, xy, 1.0 - R[0, 0] + R[1, 1] - R[2, 2], yz), 2),
+        (ca.vertcat(z, zx, yz, 1.0 - R[0, 0] - R[1, 1] + R[2, 2]), 3),
+    ):
+        better = candidate[size] > pivot
+        best, pivot = ca.if_else(better, candidate, best), ca.if_else(better, candidate[size], pivot)
+    return unit(ca.if_else(best[0] < 0.0, -best, best))

@@ -124,7 +124,8 @@ def _changes(raw: Mapping[str, Any]) -> Iterator[str]:
     if rotation.get("law") == "none":
         for key in ("mass_change", "pose_change"):
             if rotation.get(key) == "momentum":
-                yield f'rotation.{key} = "momentum": must be "rate" for rotation.law = "none": the rate never changes'
+                reason = 'must be "rate" for rotation.law = "none": the rate never changes'
+                yield f'rotation.{key} = "momentum": {reason}'
         if inputs.get("motion"):
             yield 'inputs.motion: makes no sense with rotation.law = "none": the rate never changes'
     if rotation.get("pose_change") == "rate" and inputs.get("motion"):

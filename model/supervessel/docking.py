@@ -1,6 +1,6 @@
 """Docking geometry in CasADi symbols: port frames, mating, and the bodies of a scene in the root's axes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import frexp, ldexp
 
@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from supervessel.assembly import Joint, joints
+from supervessel.assembly import Group, Joint, Way, groups, ways
 from supervessel.inertia import Body, combine, congruence
 from supervessel.quantities import Vector
 from supervessel.scene import Scene
@@ -19,14 +19,47 @@ Lookup = Callable[[str, ArrayLike], ca.SX]
 
 @dataclass(frozen=True)
 class Pose:
-    """Where a frame stands: rotation (3, 3) out of it and its origin (3,) [m], both in outer axes."""
+    """Where a frame stands: rotation (3, 3) out of it and its origin (3,) [m], both in outer axes.
+
+    velocity, rate : (3,) [m/s] of the origin and (3,) [rad/s], relative to the outer axes, in them; both None
+                     where the frame is at rest there
+    """
 
     rotation: ca.SX
     origin: ca.SX
+    velocity: ca.SX | None = None
+    rate: ca.SX | None = None
 
     def then(self, inner: "Pose") -> "Pose":
         """Returns the pose, in these outer axes, of a frame whose pose is known in this one."""
-        return Pose(self.rotation @ inner.rotation, self.origin + self.rotation @ inner.origin)
+        arm = self.rotation @ inner.origin
+        rotation, origin = self.rotation @ inner.rotation, self.origin + arm
+        velocity, rate = self.velocity, self.rate
+        if velocity is not None and rate is not None:
+            velocity = velocity + ca.cross(rate, arm)
+        if inner.velocity is not None and inner.rate is not None:
+            shift, turn = self.rotation @ inner.velocity, self.rotation @ inner.rate
+            velocity = shift if velocity is None else velocity + shift
+            rate = turn if rate is None else rate + turn
+        return Pose(rotation, origin, velocity, rate)
+
+    def inverse(self) -> "Pose":
+        """Returns the pose of the outer axes in this frame, which is at rest."""
+        return Pose(self.rotation.T, -(self.rotation.T @ self.origin))
+
+
+@dataclass(frozen=True)
+class PlacedGroup:
+    """A rigid group of vessels and how it hangs on the root.
+
+    pose     : of the group's axes in the root vessel's
+    attached : 1 while docks hold it to the root, else 0; None: always
+    inside   : poses of its vessels in the group's axes
+    """
+
+    pose: Pose
+    attached: ca.SX | None
+    inside: dict[str, Pose]
 
 
 def port_axes(direction: ca.SX, alignment: ca.SX) -> ca.SX:
@@ -56,33 +89,105 @@ def mated_pose(parent: tuple[ca.SX, ca.SX], child: tuple[ca.SX, ca.SX]) -> Pose:
 
 
 def composite_body(scene: Scene, lookup: Lookup) -> Body:
-    """Returns the whole assembly as one body in the root vessel's axes.
+    """Returns what hangs on the root as one body in the root vessel's axes.
 
-    Vessels that no pose input separates form a rigid group. Those of constant mass are combined in the axes
-    of the group's first vessel, so that they have become numbers before the group is placed by the pose that
-    moves it; the others are placed one by one.
+    Vessels that no pose input and no dock input separates form a rigid group. Those of constant mass are
+    combined in the axes of the group's first vessel, so that they have become numbers before the group is
+    placed by the pose that moves it; the others are placed one by one.
     """
-    groups = {scene.root: scene.root}
-    inside = {scene.root: Pose(constant(np.eye(3)), constant(np.zeros(3)))}
-    placed = {scene.root: inside[scene.root]}
-    moving = set(scene.inputs.pose)
-    for joint in joints(scene):
-        pose = inside[joint.parent].then(_joint_pose(scene, joint, lookup))
-        if moving.intersection(joint.ports):
-            groups[joint.child] = joint.child
-            placed[joint.child] = placed[groups[joint.parent]].then(pose)
-            inside[joint.child] = inside[scene.root]
-        else:
-            groups[joint.child] = groups[joint.parent]
-            inside[joint.child] = pose
-    members: dict[str, list[Body]] = {group: [] for group in placed}
-    for vessel, pose in inside.items():
-        members[groups[vessel]].append(_vessel_body(scene, vessel, lookup, pose))
     bodies = []
-    for group, pose in placed.items():
-        lumped = _lump(members[group])
-        bodies += lumped if group == scene.root else [b.seen_from(pose.rotation, pose.origin) for b in lumped]
+    for number, group in enumerate(placed_groups(scene, lookup)):
+        lumped = _lump([vessel_body(scene, name, lookup, pose) for name, pose in group.inside.items()])
+        if number > 0:
+            pose = group.pose
+            lumped = [b.seen_from(pose.rotation, pose.origin, pose.velocity, pose.rate) for b in lumped]
+        if group.attached is not None:
+            lumped = [body.times(group.attached) for body in lumped]
+        bodies += lumped
     return combine(bodies)
+
+
+def placed_groups(scene: Scene, lookup: Lookup) -> list[PlacedGroup]:
+    """Returns the rigid groups of a scene, the root's own first."""
+    parts = groups(scene)
+    inside = [_inside(scene, part, lookup) for part in parts]
+    home = {vessel: number for number, part in enumerate(parts) for vessel in part.vessels}
+    poses: dict[Way, Pose] = {}
+    placed = []
+    for number, alternatives in enumerate(ways(scene, parts)):
+        for way in alternatives:
+            _place(scene, way, lookup, inside, home, poses)
+        attached = [_all_true(way, lookup) for way in alternatives]
+        flags = [flag for flag in attached if flag is not None]
+        if len(alternatives) == 1 or len(flags) < len(
+            attached
+        ):  # no other way can hold beside one that always does
+            always = next((i for i, flag in enumerate(attached) if flag is None), 0)
+            placed.append(PlacedGroup(poses[alternatives[always]], attached[always], inside[number]))
+        else:
+            holds, pose = _chosen(flags, [poses[way] for way in alternatives])
+            placed.append(PlacedGroup(pose, holds, inside[number]))
+    return placed
+
+
+def _inside(scene: Scene, part: Group, lookup: Lookup) -> dict[str, Pose]:
+    """Returns the poses of a group's vessels in its own axes."""
+    poses = {part.reference: Pose(constant(np.eye(3)), constant(np.zeros(3)))}
+    for joint in part.joints:
+        poses[joint.child] = poses[joint.parent].then(_joint_pose(scene, joint, lookup))
+    return poses
+
+
+def _place(
+    scene: Scene,
+    way: Way,
+    lookup: Lookup,
+    inside: Sequence[dict[str, Pose]],
+    home: dict[str, int],
+    poses: dict[Way, Pose],
+) -> None:
+    """Adds the pose of a group that it has by one way, and of those before it on that way."""
+    if way in poses:
+        return
+    if way.joint is None or way.before is None:
+        poses[way] = inside[0][scene.root]
+        return
+    _place(scene, way.before, lookup, inside, home, poses)
+    joint = way.joint
+    step = inside[home[joint.parent]][joint.parent].then(_joint_pose(scene, joint, lookup))
+    own = inside[way.group][joint.child]
+    is_reference = next(iter(inside[way.group])) == joint.child
+    poses[way] = poses[way.before].then(step if is_reference else step.then(own.inverse()))
+
+
+def _all_true(way: Way, lookup: Lookup) -> ca.SX | None:
+    """Returns the product of the flags on a way; None if there is none on it."""
+    product = None
+    for dock in way.docks:
+        flag = lookup(f"{dock}.docked", 1.0)
+        product = flag if product is None else product * flag
+    return product
+
+
+def _chosen(flags: Sequence[ca.SX], poses: Sequence[Pose]) -> tuple[ca.SX, Pose]:
+    """Returns whether one of the ways holds, and the pose by it: all zero where none does.
+
+    flags : 1 for the way that holds, 0 for the others
+    """
+
+    def pick(values: Sequence[ca.SX]) -> ca.SX:
+        return sum(
+            (flag * value for flag, value in zip(flags[1:], values[1:], strict=True)), flags[0] * values[0]
+        )
+
+    rotation, origin = pick([p.rotation for p in poses]), pick([p.origin for p in poses])
+    attached = sum(flags[1:], flags[0])
+    if all(pose.rate is None for pose in poses):
+        return attached, Pose(rotation, origin)
+    still = ca.SX.zeros(3)
+    velocities = [still if pose.velocity is None else pose.velocity for pose in poses]
+    rates = [still if pose.rate is None else pose.rate for pose in poses]
+    return attached, Pose(rotation, origin, pick(velocities), pick(rates))
 
 
 def _lump(bodies: list[Body]) -> list[Body]:
@@ -101,9 +206,53 @@ def constant(value: ArrayLike) -> ca.SX:
 
 
 def _joint_pose(scene: Scene, joint: Joint, lookup: Lookup) -> Pose:
-    """Returns the child's pose in the parent's axes."""
+    """Returns the child's pose in the parent's axes, with its motion where a port moves.
+
+    Of ports at p_P, p_C that move with v, w each: the child's rate is w_P - R w_C, and with
+    o = p_P - R p_C its origin moves with v_P - rate x (R p_C) - R v_C.
+    """
     parent, child = (_port(scene, name, lookup) for name in joint.ports)
-    return mated_pose(parent, child)
+    pose = mated_pose(parent, child)
+    motions = [_port_motion(scene, name, lookup) for name in joint.ports]
+    if joint.dock is not None:
+        motions.append(_contact_motion(scene, joint, lookup, pose))
+    known = [motion for motion in motions if motion is not None]
+    if not known:
+        return pose
+    velocity, rate = ca.SX.zeros(3), ca.SX.zeros(3)
+    if motions[0] is not None:
+        velocity, rate = motions[0]
+    arm = pose.rotation @ child[0]
+    if motions[1] is not None:
+        rate = rate - pose.rotation @ motions[1][1]
+        velocity = velocity - pose.rotation @ motions[1][0]
+    if len(motions) > 2 and motions[2] is not None:
+        velocity, rate = velocity + motions[2][0], rate + motions[2][1]
+    return Pose(pose.rotation, pose.origin, velocity - ca.cross(rate, arm), rate)
+
+
+def _port_motion(scene: Scene, name: str, lookup: Lookup) -> tuple[ca.SX, ca.SX] | None:
+    """Returns velocity and rate of a port in its vessel's axes; None where it is at rest."""
+    if name not in scene.inputs.motion:
+        return None
+    velocity, rate = (lookup(f"{name}.{key}", np.zeros(3)) for key in ("velocity", "rate"))
+    if velocity.is_zero() and rate.is_zero():
+        return None
+    return velocity, rate
+
+
+def _contact_motion(scene: Scene, joint: Joint, lookup: Lookup, pose: Pose) -> tuple[ca.SX, ca.SX] | None:
+    """Returns velocity and rate, (3,) each, parent's axes, of the child at the port as it touches.
+
+    The inputs give those of the dock's second port relative to the first, in the axes of the first one's
+    vessel. Seen from a parent on the second port, the first one moves the other way.
+    """
+    velocity, rate = (lookup(f"{joint.dock}.{key}", np.zeros(3)) for key in ("velocity", "rate"))
+    if velocity.is_zero() and rate.is_zero():
+        return None
+    if joint.ports[0] == scene.dock(joint.dock or "").ports[0]:
+        return velocity, rate
+    return -(pose.rotation @ velocity), -(pose.rotation @ rate)
 
 
 def _port(scene: Scene, name: str, lookup: Lookup) -> tuple[ca.SX, ca.SX]:
@@ -122,7 +271,7 @@ def _scaled(vector: Vector) -> ArrayLike:
     return [ldexp(component, -exponent) for component in vector]
 
 
-def _vessel_body(scene: Scene, name: str, lookup: Lookup, pose: Pose) -> Body:
+def vessel_body(scene: Scene, name: str, lookup: Lookup, pose: Pose) -> Body:
     """Returns a vessel as a body in the axes of its group."""
     vessel = scene.vessels[name]
     mass = lookup(f"{name}.mass", vessel.mass)

@@ -6,7 +6,7 @@ computed when p changes, a when c has changed and somebody asks; everything else
 constant in this scene is a number in those functions, not an argument that is read.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
@@ -14,11 +14,12 @@ from math import frexp, ldexp
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from supervessel.attitude import attitude_dot, rotation_matrix, to_inertial, unit
-from supervessel.docking import composite_body, constant
-from supervessel.inertia import from_upper_triangle, ldl, upper_triangle
+from supervessel.changes import Change, change_functions, lookup_in
+from supervessel.docking import composite_body
+from supervessel.inertia import from_upper_triangle, ldl, ldl_inverse, upper_triangle
 from supervessel.principal import principal, principal_forward, quaternion
 from supervessel.propagators import PROPAGATORS, Plan, plan_of
 from supervessel.propagators.bound import fastest_square
@@ -26,11 +27,20 @@ from supervessel.propagators.exact import free_functions
 from supervessel.propagators.method import Motion
 from supervessel.quantities import EPSILON
 from supervessel.rotation import LAWS, turned_products
-from supervessel.scene import Scene
+from supervessel.scene import Scene, changes_rate, keeps_momentum
 from supervessel.variables import input_variables, output_variables, state_variables
+from supervessel.vessels import (
+    action_parts,
+    net_force,
+    torque_about_barycentre,
+    vessel_outputs,
+    vessel_parts,
+    vessels_shown,
+)
 
 COMPOSITE_SIZES = {"mass": 1, "barycentre": 3, "inertia": 6, "pmi": 3, "margins": 3}
-"""Layout of c; the law's own numbers follow. inertia is the upper triangle xx, yy, zz, xy, xz, yz.
+"""Layout of what every c begins with; see `composite_parts` for what follows. inertia is the upper
+triangle xx, yy, zz, xy, xz, yz.
 
 margins are the pivots of J = L D L^T less what rounding may leave of a zero: positive where the tensor is
 positive definite as far as doubles can tell.
@@ -71,12 +81,21 @@ class Equations:
 
     Derivatives: a name ending in _forward takes small changes of the arguments, each after the arguments
     themselves, to those of the results; _reverse takes weights of the results to those of the arguments.
-    response is (ode, outputs); it takes x, u, c and a, the changes or weights are those of x, u, c.
+    response is (state_ode, outputs); it takes z, u, c and a, the changes or weights are those of z, u, c.
+
+    z is the state of model exchange: x, or (attitude, angular momentum) where every change keeps that.
+    state_ode      : z, u, c -> rate of z
+    state_outputs  : z, u, c, a, e -> the outputs
+    change         : what happens when inputs change; None where the rate never changes with them
+    changing       : what the FMU needs of it
+    slices         : where the parts of c stand
     """
 
     composite: ca.Function
     axes: ca.Function
     ode: ca.Function
+    state_ode: ca.Function
+    state_outputs: ca.Function
     outputs: ca.Function
     fastest_square: ca.Function
     step: ca.Function
@@ -85,11 +104,15 @@ class Equations:
     composite_reverse: ca.Function
     response_forward: ca.Function
     response_reverse: ca.Function
+    change: Change | None
+    changing: tuple[ca.Function, ...]
     plan: Plan
+    slices: Mapping[str, slice]
     axes_slices: Mapping[str, slice]
     error_exponent: int
     product_count: int
     p_names: tuple[str, ...]
+    k_names: tuple[str, ...]
     u_names: tuple[str, ...]
     x_names: tuple[str, ...]
     y_names: tuple[str, ...]
@@ -97,23 +120,28 @@ class Equations:
     @property
     def functions(self) -> tuple[ca.Function, ...]:
         """The functions that the FMU needs."""
-        always = (self.composite, self.ode, self.outputs, *self.propagation)
+        always = (self.composite, self.state_ode, self.outputs, *self.propagation)
         derivatives = (
             self.composite_forward,
             self.composite_reverse,
             self.response_forward,
             self.response_reverse,
         )
-        return (*always, *((self.axes,) if self.axes_slices else ()), *derivatives)
+        found = (self.axes,) if self.axes_slices else ()
+        return (*always, *found, *derivatives, *self.changing)
 
 
 def composite_slices() -> dict[str, slice]:
-    """Returns where each part of c stands; "law" is what follows them."""
-    slices, start = {}, 0
-    for name, size in COMPOSITE_SIZES.items():
-        slices[name] = slice(start, start + size)
-        start += size
-    return slices | {"law": slice(start, None)}
+    """Returns where each part stands with which every c begins."""
+    return _slices(COMPOSITE_SIZES)
+
+
+def _slices(sizes: Mapping[str, int]) -> dict[str, slice]:
+    """Returns where parts of these sizes stand one after the other."""
+    slices, end = {}, 0
+    for name, size in sizes.items():
+        slices[name] = slice(end, end := end + size)
+    return slices
 
 
 @contextmanager
@@ -135,25 +163,40 @@ def equations(scene: Scene) -> Equations:
         tuple(variable.name for variable in inputs if variable.part == part)
         for part in ("shape", "contact", "action")
     )
-    p, u, x, h = (ca.SX.sym(*s) for s in (("p", len(p_names)), ("u", len(u_names)), ("x", 7), ("h", 1)))
+    p, k, u, x, h = (
+        ca.SX.sym(*s)
+        for s in (("p", len(p_names)), ("k", len(k_names)), ("u", len(u_names)), ("x", 7), ("h", 1))
+    )
 
     law, plan = LAWS[scene.rotation.law], plan_of(scene)
-    c_of_p = _composite(scene, p_names, p, law.prepare)
+    of_p = composite_parts(scene, p)
+    where = _slices({name: part.numel() for name, part in of_p.items()})
+    c_of_p = ca.densify(ca.vertcat(*of_p.values()))
     c = ca.SX.sym("c", c_of_p.numel())
-    known = ca.vertcat(*(c_of_p[i] if c_of_p[i].is_constant() else c[i] for i in range(c.numel())))
-    parts = {name: known[where] for name, where in composite_slices().items()}
+
+    def parts_of(symbols: ca.SX) -> dict[str, ca.SX]:
+        n = range(c_of_p.numel())
+        known = ca.vertcat(*(c_of_p[i] if c_of_p[i].is_constant() else symbols[i] for i in n))
+        return {name: known[place] for name, place in where.items()}
+
+    parts = parts_of(c)
     inertia = from_upper_triangle(parts["inertia"])
-    torque = u if u_names else ca.SX.zeros(3)
+    torque = torque_about_barycentre(scene, parts, u)
+    spin = parts["momentum"][:3] if "momentum" in parts and law.gyroscopic_term else None
 
     def rate(state: ca.SX) -> ca.SX:
-        acceleration = law.acceleration(parts["law"], state[4:], torque)
+        acting = torque if spin is None else torque - ca.cross(state[4:], spin)
+        acceleration = law.acceleration(parts["law"], state[4:], acting)
         return ca.vertcat(attitude_dot(state[:4], state[4:]), acceleration)
 
     products = _without_zeros(law.gyroscopic(parts["law"]))
     slices, a_of_c = _axes(scene, plan, inertia, products)
     a, e = ca.SX.sym("a", a_of_c.numel()), ca.SX.sym("e")
     by_torque = law.acceleration(parts["law"], ca.SX.zeros(3), torque)
-    fastest = fastest_square(x[4:], by_torque, law.growth, scene.rotation.max_angle_step)
+    angle = scene.rotation.max_angle_step
+    fastest = fastest_square(
+        x[4:], by_torque, law.growth, angle, None if spin is None else parts["momentum"][3]
+    )
     with_error = "error_estimate" in scene.outputs.names
     motion = Motion(x, rate, law, parts["law"], torque, h, scene.rotation.tolerance, with_error)
     method = plan.method or PROPAGATORS["dop853"]
@@ -171,22 +214,43 @@ def equations(scene: Scene) -> Equations:
     )
     if plan.free != "never":
         propagation += free_functions(a.numel(), slices["free"])
-    y = _outputs(scene, x, parts, a[slices["principal"]] if "principal" in slices else ca.SX.zeros(7), e)
+    change = change_functions(scene, law, c, parts_of, p, k) if changes_rate(scene) else None
+    z = ca.SX.sym("z", 7)
+    by_momentum = change is not None and keeps_momentum(scene)
+    x_of_z = ca.vertcat(z[:4], change.rate_of_momentum(z[4:], c)) if change and by_momentum else x
+    state = z if by_momentum else x
+
+    def outputs_from(x: ca.SX) -> ca.SX:
+        shown = a[slices["principal"]] if "principal" in slices else ca.SX.zeros(7)
+        return _outputs(scene, x, u, parts, shown, e)
+
+    y = outputs_from(x_of_z)
+    z_rate = rate(x)
+    if by_momentum:
+        turning = ca.cross(x_of_z[4:], z[4:]) if law.gyroscopic_term else ca.SX.zeros(3)
+        z_rate = ca.vertcat(attitude_dot(z[:4], x_of_z[4:]), torque - turning)
+    state_args, state_names = [state, u, c], ["z" if by_momentum else "x", "u", "c"]
     return Equations(
         composite=ca.Function("composite", [p], [c_of_p], ["p"], ["c"]),
         axes=ca.Function("axes", [c], [a_of_c], ["c"], ["a"]),
         ode=ca.Function("ode", args, [rate(x)], names, ["x_dot"]),
-        outputs=ca.Function("outputs", [*args, a, e], [y], [*names, "a", "e"], ["y"]),
+        state_ode=ca.Function("ode", state_args, [z_rate], state_names, [f"{state_names[0]}_dot"]),
+        outputs=ca.Function("outputs", [*args, a, e], [outputs_from(x)], [*names, "a", "e"], ["y"]),
+        state_outputs=ca.Function("outputs", [*state_args, a, e], [y], [*state_names, "a", "e"], ["y"]),
         fastest_square=steps[0],
         step=steps[1],
         propagation=tuple(propagation),
         product_count=products.size2(),
         **_derivatives("composite", [p], [c_of_p]),
-        **_derivatives("response", args, [rate(x), y], (a, *_axes_change(inertia, c, a, slices))),
+        **_derivatives("response", state_args, [z_rate, y], (a, *_axes_change(inertia, c, a, slices))),
+        change=change,
+        changing=_changing(scene, change, by_momentum),
         plan=plan,
+        slices=where,
         axes_slices=slices,
         error_exponent=step.exponent,
         p_names=p_names,
+        k_names=k_names,
         u_names=u_names,
         x_names=tuple(variable.name for variable in state_variables(scene)),
         y_names=tuple(variable.name for variable in output_variables(scene)),
@@ -259,40 +323,58 @@ def p_start(scene: Scene) -> NDArray[np.float64]:
 @simplification(True)
 def composite_at_start(scene: Scene) -> dict[str, NDArray[np.float64]]:
     """Returns the parts of c by name, (n,) each, for the scene's own values of the inputs."""
-    inputs = [v for v in input_variables(scene) if v.part == "shape"]
-    p = ca.SX.sym("p", len(inputs))
-    names = tuple(v.name for v in inputs)
-    c = ca.Function("composite", [p], [_composite(scene, names, p, LAWS[scene.rotation.law].prepare)])
-    values = np.array(c(p_start(scene))).ravel()
-    return {name: values[where] for name, where in composite_slices().items()}
+    start = p_start(scene)
+    p = ca.SX.sym("p", len(start))
+    parts = composite_parts(scene, p)
+    c = ca.Function("composite", [p], [ca.vertcat(*parts.values())])
+    values = np.array(c(start)).ravel()
+    return {name: values[where] for name, where in _slices({n: v.numel() for n, v in parts.items()}).items()}
 
 
-def _composite(scene: Scene, names: tuple[str, ...], p: ca.SX, prepare: Callable[[ca.SX], ca.SX]) -> ca.SX:
-    """Returns c as an expression of p."""
-    symbols = dict(zip(names, ca.vertsplit(p), strict=True)) if names else {}
+def composite_parts(scene: Scene, p: ca.SX) -> dict[str, ca.SX]:
+    """Returns the parts of c by name as expressions of p: those of COMPOSITE_SIZES, then
 
-    def lookup(group: str, value: ArrayLike) -> ca.SX:
-        if group in symbols:
-            return symbols[group]
-        if f"{group}[1]" in symbols:
-            return ca.vertcat(*(symbols[f"{group}[{i}]"] for i in (1, 2, 3)))
-        return constant(value)
-
+    law           : the law's own numbers
+    momentum      : where ports move, angular momentum h, (3,) [N m s], of what moves relative to the body
+                    axes, and the square of a bound, [rad2/s2], of |J^-1 (omega x h)|/|omega|
+    moment, force : see `vessels.action_parts`
+    .NAME         : see `vessels.vessel_parts`
+    """
+    law = LAWS[scene.rotation.law]
+    lookup = lookup_in(scene, p, ("shape",))
     body = composite_body(scene, lookup)
     J = body.inertia
-    _, pivots = ldl(J)
-    return ca.densify(
-        ca.vertcat(
-            body.mass,
-            body.centre,
-            upper_triangle(J),
-            ca.diag(J) / body.mass,
-            pivots[0],
-            pivots[1] - PIVOT_SLACK * J[1, 1],
-            pivots[2] - PIVOT_SLACK * (J[2, 2] * (J[1, 1] / pivots[1])),
-            prepare(J),
-        )
+    lower, pivots = ldl(J)
+    margins = ca.vertcat(
+        pivots[0],
+        pivots[1] - PIVOT_SLACK * J[1, 1],
+        pivots[2] - PIVOT_SLACK * (J[2, 2] * (J[1, 1] / pivots[1])),
     )
+    parts = {
+        "mass": body.mass,
+        "barycentre": body.centre,
+        "inertia": upper_triangle(J),
+        "pmi": ca.diag(J) / body.mass,
+        "margins": margins,
+        "law": law.prepare(J),
+    }
+    if body.spin is not None:
+        bound = ca.trace(ldl_inverse(lower, pivots))
+        parts["momentum"] = ca.vertcat(body.spin, ca.sumsqr(body.spin) * bound * bound)
+    parts |= action_parts(scene, lookup, body.centre) | vessel_parts(scene, lookup, body)
+    return {name: ca.densify(part) for name, part in parts.items()}
+
+
+def _changing(scene: Scene, change: Change | None, by_momentum: bool) -> tuple[ca.Function, ...]:
+    """Returns what the FMU needs of a change: with derivatives, of the state by momentum, else of follow."""
+    if change is None:
+        return ()
+    functions = [change.momentum_of, change.rate_of_momentum] if by_momentum else []
+    functions += [change.keep_momentum] if "momentum" in scene.keeps.values() else []
+    for function in functions[:1]:
+        arguments = [ca.SX.sym(f"v{i}", function.numel_in(i)) for i in range(function.n_in())]
+        functions += _derivatives(function.name(), arguments, [function(*arguments)]).values()
+    return (*functions, *((change.contact_momentum, change.docked_rate) if scene.inputs.docked else ()))
 
 
 def _derivatives(
@@ -330,7 +412,7 @@ def _split(vector: ca.SX, like: list[ca.SX]) -> list[ca.SX]:
 
 
 def _outputs(
-    scene: Scene, x: ca.SX, parts: dict[str, ca.SX], principal_part: ca.SX, estimate: ca.SX
+    scene: Scene, x: ca.SX, u: ca.SX, parts: dict[str, ca.SX], principal_part: ca.SX, estimate: ca.SX
 ) -> ca.SX:
     """Returns the scene's outputs, in its order.
 
@@ -339,7 +421,8 @@ def _outputs(
     """
     attitude, omega = unit(x[:4]), x[4:]
     J = from_upper_triangle(parts["inertia"])
-    momentum = J @ omega
+    turned = J @ omega
+    momentum = turned + parts["momentum"][:3] if "momentum" in parts else turned
     available = {
         "mass": parts["mass"],
         "barycentre": parts["barycentre"],
@@ -347,10 +430,13 @@ def _outputs(
         "inertia": ca.vec(J),
         "angular_velocity": omega,
         "attitude": attitude,
-        "kinetic_energy": 0.5 * ca.dot(omega, momentum),
+        "kinetic_energy": 0.5 * ca.dot(omega, turned),
         "angular_momentum": to_inertial(attitude, momentum),
         "principal_moments": principal_part[:3],
         "principal_axes": principal_part[3:],
         "error_estimate": estimate,
+        "net_force": net_force(scene, parts, u),
     }
+    for name in vessels_shown(scene):
+        available |= vessel_outputs(name, parts[f".{name}"], attitude, omega)
     return ca.densify(ca.vertcat(*(available[name] for name in scene.outputs.names)))

@@ -14,24 +14,40 @@ UPPER_TRIANGLE = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body seen from some axes.
+    """A body seen from some axes.
 
     mass      : [kg]
     centre    : (3,) [m], its centre of mass
     inertia   : (3, 3) [kg m2], about the centre of mass
+    velocity  : (3,) [m/s], of the centre, relative to the axes; None: at rest in them, and so is all of it
+    spin      : (3,) [N m s], angular momentum about the centre of what moves relative to the axes, or None
     """
 
     mass: ca.SX
     centre: ca.SX
     inertia: ca.SX
+    velocity: ca.SX | None = None
+    spin: ca.SX | None = None
 
-    def seen_from(self, rotation: ca.SX, origin: ca.SX) -> "Body":
-        """Returns the body in other axes.
+    def seen_from(
+        self, rotation: ca.SX, origin: ca.SX, velocity: ca.SX | None = None, rate: ca.SX | None = None
+    ) -> "Body":
+        """Returns the body, at rest in these axes, in other ones.
 
         rotation : (3, 3), takes components in these axes to components in the other ones
         origin   : (3,) [m], origin of these axes in the other ones
+        velocity : (3,) [m/s], of that origin relative to the other axes; None: these axes are at rest there
+        rate     : (3,) [rad/s], of these axes relative to the other ones, in the other ones; or None
         """
-        return Body(self.mass, origin + rotation @ self.centre, congruence(rotation, self.inertia))
+        arm, inertia = rotation @ self.centre, congruence(rotation, self.inertia)
+        if velocity is None or rate is None:
+            return Body(self.mass, origin + arm, inertia)
+        return Body(self.mass, origin + arm, inertia, velocity + ca.cross(rate, arm), inertia @ rate)
+
+    def times(self, factor: ca.SX) -> "Body":
+        """Returns the body with its mass, and so all that follows from it, times a factor."""
+        spin = None if self.spin is None else factor * self.spin
+        return Body(factor * self.mass, self.centre, factor * self.inertia, self.velocity, spin)
 
 
 def congruence(rotation: ca.SX, inertia: ca.SX) -> ca.SX:
@@ -55,6 +71,7 @@ def combine(bodies: Sequence[Body]) -> Body:
     J = sum J_j + m_j (|rho_j|^2 E - rho_j rho_j^T), rho_j from the common centre to body j's. Centres are
     taken from that of the first body before anything is multiplied, so that a far origin costs no digits
     beyond those of the centres' differences; an error of the common centre enters J squared only.
+    The spin, h = sum h_j + m_j rho_j x rho_j', is taken about the common centre as well.
     Source: [CV] eqs. (10), (11); Huygens-Steiner theorem.
     """
     first, *others = bodies
@@ -66,11 +83,22 @@ def combine(bodies: Sequence[Body]) -> Body:
     inertia = ca.SX.zeros(3, 3)
     for body, offset in zip(bodies, offsets, strict=True):
         rho = offset - centre
-        inertia = inertia + body.inertia + body.mass * _offset_tensor(rho)
-    return Body(mass, first.centre + centre, inertia)
+        inertia = inertia + body.inertia + body.mass * offset_tensor(rho)
+    if all(body.velocity is None for body in bodies):
+        return Body(mass, first.centre + centre, inertia)
+    moving = [
+        (b, b.velocity, offset - centre)
+        for b, offset in zip(bodies, offsets, strict=True)
+        if b.velocity is not None
+    ]
+    velocity = sum((body.mass * v for body, v, _ in moving), ca.SX.zeros(3)) / mass
+    # sum m_j rho_j = 0: the common velocity need not be taken off
+    spin = sum((body.mass * ca.cross(rho, v) for body, v, rho in moving), ca.SX.zeros(3))
+    spin = sum((body.spin for body, _, _ in moving if body.spin is not None), spin)
+    return Body(mass, first.centre + centre, inertia, velocity, spin)
 
 
-def _offset_tensor(d: ca.SX) -> ca.SX:
+def offset_tensor(d: ca.SX) -> ca.SX:
     """Returns |d|^2 E - d d^T, (3, 3)."""
     return symmetric(lambda i, j: _offset_square(d, i, j))
 
@@ -91,6 +119,17 @@ def ldl(inertia: ca.SX) -> tuple[ca.SX, ca.SX]:
     l32 = below / d2
     d3 = inertia[2, 2] - l31 * inertia[2, 0] - l32 * below
     return ca.vertcat(l21, l31, l32), ca.vertcat(inertia[0, 0], d2, d3)
+
+
+def ldl_solve(lower: ca.SX, pivots: ca.SX, right: ca.SX) -> ca.SX:
+    """Returns the solution of L D L^T x = right, (3,), from `ldl`."""
+    y1 = right[0]
+    y2 = right[1] - lower[0] * y1
+    y3 = right[2] - lower[1] * y1 - lower[2] * y2
+    x3 = y3 / pivots[2]
+    x2 = y2 / pivots[1] - lower[2] * x3
+    x1 = y1 / pivots[0] - lower[0] * x2 - lower[1] * x3
+    return ca.vertcat(x1, x2, x3)
 
 
 def ldl_inverse(lower: ca.SX, pivots: ca.SX) -> ca.SX:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from supervessel.assembly import TooManyWaysError
 from supervessel.consistency import consistency_problems
 from supervessel.equations import composite_at_start
 from supervessel.naming import naming_problems
@@ -105,7 +106,10 @@ def _range_problems(scene: Scene) -> list[str]:
 
 def _composite_problems(scene: Scene) -> list[str]:
     """Returns why the whole cannot turn: numbers that overflow, or a tensor that the law cannot use."""
-    c = composite_at_start(scene)
+    try:
+        c = composite_at_start(scene)
+    except TooManyWaysError as error:
+        return [str(error)]
     if not all(np.all(np.isfinite(c[part])) for part in ("barycentre", "inertia", "pmi")):
         return ["vessels: masses, positions or moments are too large: the composite's inertia is not finite"]
     law = scene.rotation.law

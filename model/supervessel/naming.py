@@ -136,7 +136,9 @@ def _docks(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[s
         yield from (f"{place}: {problem}" for problem in problems)
         occupied = always if open_at_start and switchable else taken
         yield from (
-            f"{place}: port {name} is docked already, in {occupied[name]}" for name in names if name in occupied
+            f"{place}: port {name} is docked already, in {occupied[name]}"
+            for name in names
+            if name in occupied
         )
         vessels = [name.partition(".")[0] for name in names]
         if not all(vessel in ports for vessel in vessels):

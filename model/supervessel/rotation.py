@@ -33,6 +33,7 @@ class RotationLaw:
     products     : pairs (i, j), n of them: without torque the acceleration is linear in omega_i omega_j
     gyroscopic   : the law's numbers -> that linear map, (3, n)
     turning      : inertia (3, 3) -> the tensor, (3, 3), whose free motion the law describes
+    keeping      : inertia (3, 3) -> the tensor, (3, 3), by which a change keeps the angular momentum
     """
 
     prepare: Callable[[ca.SX], ca.SX]
@@ -41,6 +42,12 @@ class RotationLaw:
     products: tuple[tuple[int, int], ...]
     gyroscopic: Callable[[ca.SX], ca.SX]
     turning: Callable[[ca.SX], ca.SX]
+    keeping: Callable[[ca.SX], ca.SX]
+
+    @property
+    def gyroscopic_term(self) -> bool:
+        """Whether angular momentum turns the angular velocity."""
+        return bool(self.products)
 
 
 MIXED_PRODUCTS = ((1, 2), (2, 0), (0, 1))
@@ -151,12 +158,18 @@ def turned_products(moments: ca.SX, axes: ca.SX) -> ca.SX:
 
 
 LAWS: dict[Law, RotationLaw] = {
-    "none": RotationLaw(_nothing, _keep, 0.0, (), _no_products, _spherical),
-    "decoupled": RotationLaw(_reciprocal_moments, _decoupled, 0.0, (), _no_products, _spherical),
+    "none": RotationLaw(_nothing, _keep, 0.0, (), _no_products, _spherical, _whole),
+    "decoupled": RotationLaw(_reciprocal_moments, _decoupled, 0.0, (), _no_products, _spherical, _diagonal),
     "principal": RotationLaw(
-        _moments, _principal, GYROSCOPIC_GROWTH, MIXED_PRODUCTS, _principal_products, _diagonal
+        _moments, _principal, GYROSCOPIC_GROWTH, MIXED_PRODUCTS, _principal_products, _diagonal, _diagonal
     ),
     "tensor": RotationLaw(
-        _tensor_and_inverse, _tensor, GYROSCOPIC_GROWTH, MIXED_PRODUCTS + SQUARES, _tensor_products, _whole
+        _tensor_and_inverse,
+        _tensor,
+        GYROSCOPIC_GROWTH,
+        MIXED_PRODUCTS + SQUARES,
+        _tensor_products,
+        _whole,
+        _whole,
     ),
 }

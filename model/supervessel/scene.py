@@ -253,7 +253,7 @@ class Scene(Table):
 
     @property
     def keeps(self) -> dict[str, Kept]:
-        """What a change keeps, for the kinds of change that the inputs can make: "mass" (and moments), "pose".
+        """What a change keeps, for the kinds of change that inputs can make: "mass" (and moments), "pose".
 
         A pose keeps momentum unless the scene says otherwise; the law "none" keeps the angular velocity
         always.
@@ -265,6 +265,17 @@ class Scene(Table):
         if inputs.pose:
             kinds["pose"] = rotation.pose_change or ("rate" if rotation.law == "none" else "momentum")
         return kinds
+
+
+def keeps_momentum(scene: Scene) -> bool:
+    """Whether every change that inputs can make keeps momentum: it is then the state of model exchange."""
+    return set(scene.keeps.values()) == {"momentum"}
+
+
+def changes_rate(scene: Scene) -> bool:
+    """Whether a change of inputs can change the angular velocity."""
+    changing = "momentum" in scene.keeps.values() or bool(scene.inputs.docked)
+    return changing and scene.rotation.law != "none"
 
 
 TABLES: dict[tuple[str, ...], type[Table]] = {

@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from supervessel.changes import followed
 from supervessel.equations import Equations, composite_slices, equations, p_start, simplification
 from supervessel.inertia import from_upper_triangle
 from supervessel.propagators.exact import free_step
@@ -14,6 +15,13 @@ from supervessel.scene import Propagator, Scene
 
 GAP = 1e-8
 """Least difference of principal moments, over the largest, for derivatives of free motion by p."""
+
+
+X_NAMES = (
+    *(f"state.attitude[{i}]" for i in range(1, 5)),
+    *(f"state.angular_velocity[{i}]" for i in range(1, 4)),
+)
+"""Names of the FMU's states, which the twin's are wherever the angular velocity is one."""
 
 
 class Twin:
@@ -63,8 +71,8 @@ class Twin:
             rotation = scene.rotation.model_copy(update={"propagator": propagator})
             scene = scene.model_copy(update={"rotation": rotation})
         self.scene, self.doublings = scene, doublings
-        model = equations(scene)
-        self.p_names, self.u_names, self.x_names = model.p_names, model.u_names, model.x_names
+        model = self._model = equations(scene)
+        self.p_names, self.u_names, self.x_names = model.p_names + model.k_names, model.u_names, X_NAMES
         self.y_names = tuple(name for name in model.y_names if name != "error_estimate")
         self.p = ca.SX.sym("p", len(self.p_names))
         self.u = ca.SX.sym("u", len(self.u_names))
@@ -77,7 +85,8 @@ class Twin:
 
     def _compose(self, model: Equations) -> None:
         """Makes functions of p out of those of c."""
-        c = model.composite(self.p)
+        shaping = len(model.p_names)
+        c = model.composite(self.p[:shaping])
         where = composite_slices()
         inertia = from_upper_triangle(c[where["inertia"]])
         args, names = [self.x, self.u, self.p], ["x", "u", "p"]
@@ -118,6 +127,23 @@ class Twin:
         return stepped(self.x)
 
     @cached_property
+    def change(self) -> ca.Function:
+        """x, p, p_next -> x_next: what becomes of the state when the inputs p change, at one instant.
+
+        What undocks leaves with its share; masses, then poses change and keep rate or momentum as the scene
+        says; what docks brings its momentum along, moving as the inputs of motion at contact in p_next say.
+        """
+        model = self._model
+        p_next = ca.SX.sym("p_next", self.p.numel())
+        omega, shaping = self.x[4:], len(model.p_names)
+        if model.change is not None:
+            inputs = (omega, self.p[:shaping], p_next[:shaping], p_next[shaping:])
+            with simplification(False):
+                omega = followed(self.scene, model.change, model.composite, inputs)
+        x_next = ca.vertcat(self.x[:4], omega)
+        return ca.Function("change", [self.x, self.p, p_next], [x_next], ["x", "p", "p_next"], ["x_next"])
+
+    @cached_property
     def x_start(self) -> NDArray[np.float64]:
         """The scene's state at the start, (7,)."""
         rotation = self.scene.rotation
@@ -126,7 +152,7 @@ class Twin:
     @cached_property
     def p_start(self) -> NDArray[np.float64]:
         """The scene's values of p, (n,)."""
-        return p_start(self.scene)
+        return np.append(p_start(self.scene), np.zeros(len(self._model.k_names)))
 
 
 def _zero_without_derivative_at_equal(moments: ca.SX) -> ca.SX:

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from supervessel import reference
-from supervessel.scene import VARIABLE_UNITS, Scene, input_groups
+from supervessel.scene import VARIABLE_UNITS, Scene, input_groups, keeps_momentum
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,6 @@ class Variable:
     def group(self) -> str:
         """The name without its index."""
         return self.name.partition("[")[0]
-
 
     @property
     def boolean(self) -> bool:
@@ -85,9 +84,7 @@ VESSEL_OUTPUT_DESCRIPTIONS = {
 }
 """Of outputs of a vessel; they are all zero while it is not docked to the root's part."""
 
-STATES = {"attitude": QUATERNION, "angular_velocity": AXES}
-
-RATE_UNITS = {"": "1/s", "rad/s": "rad/s2"}
+RATE_UNITS = {"": "1/s", "rad/s": "rad/s2", "N.m.s": "N.m"}
 
 
 def input_variables(scene: Scene) -> tuple[InputVariable, ...]:
@@ -141,7 +138,9 @@ def _input_description(scene: Scene, owner: str, kind: str, index: int) -> str:
     vessel = owner.partition(".")[0]
     if owner in scene.inputs.docked:
         first, second = scene.dock(owner).ports
-        meeting = f"at contact, of {second} relative to {first}, {axis} in the axes of {first.partition('.')[0]}"
+        meeting = (
+            f"at contact, of {second} relative to {first}, {axis} in the axes of {first.partition('.')[0]}"
+        )
         return {
             "docked": f"whether {first} and {second} are docked",
             "velocity": f"velocity {meeting}",
@@ -154,7 +153,7 @@ def _input_description(scene: Scene, owner: str, kind: str, index: int) -> str:
         "direction": f"approach direction of docking port {owner}, outward, {axis} in the axes of {vessel}",
         "alignment": f"alignment direction of docking port {owner}, {axis} in the axes of {vessel}",
         "velocity": f"rate of change of the position of docking port {owner}, {axis} in the axes of {vessel}",
-        "rate": f"angular velocity of docking port {owner} relative to {vessel}, {axis} in the axes of {vessel}",
+        "rate": f"angular velocity of docking port {owner}, {axis} in the axes of {vessel}",
         "torque": f"external torque on {owner}, {axis} in its axes"
         if owner
         else f"external torque about the barycentre, {axis} in body axes",
@@ -235,15 +234,25 @@ def _elements(group: str) -> Iterable[tuple[str, str]]:
 
 
 def state_variables(scene: Scene) -> tuple[Variable, ...]:
-    """Returns the seven states: attitude (w, x, y, z), then angular velocity (x, y, z) in body axes."""
+    """Returns the seven states of model exchange: attitude (w, x, y, z), then what changes keep.
+
+    That is the angular velocity, or the angular momentum where every change keeps it; (x, y, z) in body axes.
+    """
+    kept = "angular_momentum" if keeps_momentum(scene) else "angular_velocity"
+    descriptions = OUTPUT_DESCRIPTIONS | {
+        "angular_momentum": "angular momentum about the barycentre, body axes"
+    }
+    nominals = {"attitude": 1.0, kept: _rate(scene)}
+    if kept == "angular_momentum":
+        nominals[kept] = _usable(_output_nominals(scene)[kept])
     return tuple(
         Variable(
             f"state.{group}[{i}]",
             VARIABLE_UNITS[group],
-            f"state: {OUTPUT_DESCRIPTIONS[group]}, {label}",
-            nominal=_rate(scene) if group == "angular_velocity" else 1.0,
+            f"state: {descriptions[group]}, {label}",
+            nominal=nominals[group],
         )
-        for group, labels in STATES.items()
+        for group, labels in (("attitude", QUATERNION), (kept, AXES))
         for i, label in enumerate(labels, start=1)
     )
 

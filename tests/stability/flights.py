@@ -58,7 +58,7 @@ def one_tensor(propagator: str, inertia: Array) -> dict[str, Any]:
 def _composite(raw: dict[str, Any]) -> bytes:
     """Returns what follows from the inertia of a scene's body as the FMU keeps it."""
     parts = composite_at_start(scene(raw))
-    return np.concatenate([parts[name] for name in composite_slices()]).tobytes()
+    return np.concatenate([parts[name] for name in (*composite_slices(), "law")]).tobytes()
 
 
 @cache

@@ -127,6 +127,7 @@ class Instance:
         folder, description = _unpacked(built(raw, fmi))
         self.fmi, self.description = fmi, description
         self.references = {v.name: v.valueReference for v in description.modelVariables}
+        self.booleans = {v.name for v in description.modelVariables if v.type == "Boolean"}
         self.log: list[tuple[int, str, str]] = []
         arguments = {
             "guid": description.guid,
@@ -197,7 +198,17 @@ class Instance:
         return status
 
     def set(self, values: Mapping[str, Any]) -> int:
-        """Sets scalars by name, or whole vectors by the name without index, in one call."""
+        """Sets scalars by name, or whole vectors by the name without index, in one call.
+
+        Booleans go before them, in a call of their own.
+        """
+        booleans = {name: value for name, value in values.items() if name in self.booleans}
+        if booleans:
+            references = [self.references[name] for name in booleans]
+            status = self._status(self.fmu.setBoolean, references, list(map(bool, booleans.values())))
+            if status or len(booleans) == len(values):
+                return status
+            values = {name: value for name, value in values.items() if name not in booleans}
         names, numbers = [], []
         for name, value in values.items():
             group = self.names(name)
@@ -212,6 +223,8 @@ class Instance:
 
         Raises FMICallException where the FMU does not answer.
         """
+        if name in self.booleans:
+            return bool(self.fmu.getBoolean([self.references[name]])[0])
         getter = self.fmu.getFloat64 if self.fmi == 3 else self.fmu.getReal
         numbers = np.array(getter([self.references[element] for element in self.names(name)]))
         return float(numbers[0]) if name in self.references else numbers

@@ -26,6 +26,10 @@ TIGHTEST_OF_DOP853 = 1e-6
 """Tolerance below which "auto" takes Taylor steps: they then cost less (`make bench`)."""
 
 
+CHANGING = ("mass", "pmi", "pose", "docked", "torque", "force", "vessel_torque")
+"""Inputs by which a motion may be other than free; Taylor steps know no spin of moving parts."""
+
+
 @dataclass(frozen=True)
 class Plan:
     """What a scene's co-simulation uses.
@@ -46,9 +50,10 @@ def plan_of(scene: "Scene") -> Plan:
         chosen = PROPAGATORS[name]
         return Plan(chosen if chosen.build else None, chosen.free)
     inputs = scene.inputs
-    if not (inputs.torque or inputs.mass or inputs.pmi or inputs.pose):
+    if not any(getattr(inputs, key) for key in CHANGING):
         return Plan(None, "always")
-    method = "dop853" if scene.rotation.tolerance >= TIGHTEST_OF_DOP853 else "taylor"
+    by_runge_kutta = inputs.motion or scene.rotation.tolerance >= TIGHTEST_OF_DOP853
+    method = "dop853" if by_runge_kutta else "taylor"
     return Plan(PROPAGATORS[method], "while free")
 
 

@@ -1,0 +1,51 @@
+/* What happens to the angular velocity when inputs change: see supervessel/changes.py. */
+#ifndef CHANGES_H
+#define CHANGES_H
+
+#include "instance.h"
+
+/* What kind of change an input of the composite makes, as bits. */
+enum { KIND_MASS = 1, KIND_POSE = 2, KIND_DOCKED = 4 };
+
+#if CHANGES
+/* By place in p. */
+extern const unsigned char INPUT_KINDS[INPUT_P_COUNT];
+#endif
+
+#if DOCK_COUNT
+typedef struct {
+    const char *ports[2], *vessels[2]; /* names */
+    int vessel[2];                     /* numbers */
+    int flag;                          /* place in p of the input that closes it; -1: it is always closed */
+    int motion;                        /* place among the inputs of motion at contact, or -1 */
+} Dock;
+
+extern const Dock DOCKS[DOCK_COUNT];
+#endif
+
+/* Judges which docks are closed; p holds their flags. */
+Status changes_check_docks(Instance *instance, const double p[]);
+
+/* Makes the rate follow from a change to p, whose composite is c; they become current if it can. */
+Status changes_apply(Instance *instance, const double p[], const double c[]);
+
+/* The inputs and the rate as they are now are those that the next change begins from. */
+void changes_commit(Instance *instance);
+
+/* Whether the rate has changed since the last commit. */
+bool changes_moved(const Instance *instance);
+
+/* Where the state of model exchange is the angular momentum: makes x follow from the states in model exchange, the
+   states from x elsewhere, unless they do. */
+void changes_mirror(Instance *instance);
+
+/* What small changes of the inputs make of the angular velocity, added to v->x: by what the last change kept. Reverse:
+   weights on v->x to weights on the inputs. */
+void changes_forward(Instance *instance, Variation *v);
+void changes_reverse(Instance *instance, Variation *v);
+
+/* The state's momentum at the start: a change of v->x, of rate, to one of momentum, and weights back. */
+void changes_start_forward(Instance *instance, Variation *v);
+void changes_start_reverse(Instance *instance, Variation *v);
+
+#endif
