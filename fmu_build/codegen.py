@@ -13,7 +13,7 @@ from fmu_build.changes import change_constants
 from fmu_build.errors import BuildError
 from fmu_build.table import Entry
 from supervessel.equations import Equations
-from supervessel.propagators.free_motion import FIRST_ANGLE
+from supervessel.propagators.free_motion import FIRST_ANGLE, LARGEST_TURN
 from supervessel.scene import Scene
 from supervessel.variables import InputVariable
 
@@ -106,6 +106,7 @@ def scene_header(scene: Scene, model: Equations, entries: Sequence[Entry]) -> st
         "TOLERANCE": repr(scene.rotation.tolerance),
         "MAX_ANGLE_STEP": f"{scene.rotation.max_angle_step!r} /* largest angle of a sub-step [rad] */",
         "FIRST_ANGLE": f"{FIRST_ANGLE!r} /* up to which free motion is a series [rad] */",
+        "LARGEST_TURN": f"{LARGEST_TURN!r} /* up to which free motion is followed [rad] */",
     }
     return (
         "/* Generated: what the C layer must know of the scene. */\n"

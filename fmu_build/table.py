@@ -3,14 +3,14 @@
 The modelDescription.xml and the C layer are both written from it.
 """
 
-from collections.abc import Iterable, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from typing import Literal
 
 import casadi as ca
 
-from supervessel.equations import Equations, composite_slices
-from supervessel.scene import Scene
+from supervessel.equations import Equations
+from supervessel.scene import Scene, keeps_momentum
 from supervessel.variables import (
     Variable,
     derivative_variables,
@@ -48,6 +48,9 @@ class Entry:
     initial: tuple[Dependency, ...] = ()
 
 
+Rows = dict[Role, list[tuple[Dependency, ...]]]
+"""Dependencies of each variable of a role."""
+
 TIME = Variable("time", "s", "simulation time")
 
 
@@ -70,35 +73,61 @@ def variable_table(scene: Scene, model: Equations) -> tuple[Entry, ...]:
     inputs = list(enumerate(input_variables(scene), start=first["input"]))
     knowns += [reference for reference, variable in inputs if variable.part != "contact"]
     booleans = frozenset(reference for reference, variable in inputs if variable.boolean)
-    by_role = _dependencies(model, knowns, booleans)
+    by_role, at_start = _dependencies(scene, model, knowns, booleans)
     entries = []
     for role, variables in groups.items():
         for i, variable in enumerate(variables):
-            now = by_role[role][i] if role in ("output", "derivative") else ()
-            start = now
-            if role == "state":
-                start = (Dependency(first["state"] + i, "constant"),)
+            now = by_role[role][i] if role in by_role else ()
+            start = at_start[role][i] if role in at_start else ()
             initial = _at_start(start, first["state"], first["parameter"])
             entries.append(Entry(variable, first[role] + i, role, now, initial))
     return tuple(entries)
 
 
 def _dependencies(
-    model: Equations, knowns: Sequence[int], booleans: Set[int]
-) -> dict[Role, list[tuple[Dependency, ...]]]:
-    """Returns the dependencies of each output and each derivative on states and inputs.
+    scene: Scene, model: Equations, knowns: Sequence[int], booleans: Set[int]
+) -> tuple[Rows, Rows]:
+    """Returns the dependencies of outputs and derivatives on states and inputs; and at the start those of
+    states, too, on attitude and angular velocity, which stand for the states then, and on inputs.
 
-    knowns   : value references of states and inputs (p, u); what a part docks with acts at that instant alone
+    knowns   : value references of states and inputs (p, u); the motion with which a part docks acts at that
+               instant alone
     booleans : those of Booleans among them
     """
-    p, u, x = (ca.SX.sym(*s) for s in (("p", len(model.p_names)), ("u", len(model.u_names)), ("x", 7)))
+    p, u, z = (ca.SX.sym(*s) for s in (("p", len(model.p_names)), ("u", len(model.u_names)), ("z", 7)))
     c = model.composite(p)
     # principal moments and axes follow from every element of the inertia, and not linearly
-    a = ca.repmat(ca.sumsqr(c[composite_slices()["inertia"]]), model.axes.numel_out(0))
-    known = ca.vertcat(x, p, u)
-    y = model.outputs(x, u, c, a, 0.0)
-    unknowns: dict[Role, ca.SX] = {"output": y, "derivative": model.ode(x, u, c)}
-    return {role: _rows(unknown, known, knowns, booleans) for role, unknown in unknowns.items()}
+    a = ca.repmat(ca.sumsqr(c[model.slices["inertia"]]), model.axes.numel_out(0))
+    known = ca.vertcat(z, p, u)
+
+    def rows(unknowns: Mapping[Role, ca.SX]) -> Rows:
+        return {role: _rows(unknown, known, knowns, booleans) for role, unknown in unknowns.items()}
+
+    follows = _after_change(scene, model, z, p, c)
+    now = rows(
+        {"output": model.state_outputs(follows, u, c, a, 0.0), "derivative": model.state_ode(follows, u, c)}
+    )
+    if model.change is None:
+        return now, now | rows({"state": z})
+    begun = ca.vertcat(z[:4], model.change.momentum_of(z[4:], c)) if keeps_momentum(scene) else z
+    rate = ca.vertcat(model.ode(z, u, c)[:4], model.state_ode(begun, u, c)[4:])
+    return now, rows({"output": model.outputs(z, u, c, a, 0.0), "derivative": rate, "state": begun})
+
+
+def _after_change(scene: Scene, model: Equations, z: ca.SX, p: ca.SX, c: ca.SX) -> ca.SX:
+    """Returns what stands for the states after a change of inputs: its structure tells what they follow from.
+
+    A state that is the angular momentum is what a change of mass or pose keeps; the angular velocity follows.
+    """
+    if model.change is None:
+        return z
+    rate = z[4:]
+    if "momentum" in scene.keeps.values() and not keeps_momentum(scene):
+        rate = model.change.keep_momentum(rate, ca.SX.sym("before", c.numel()), c)
+    flags = [
+        flag for name, flag in zip(model.p_names, ca.vertsplit(p), strict=True) if name.endswith(".docked")
+    ]
+    return ca.vertcat(z[:4], rate + sum(flags, ca.SX(0)))
 
 
 def _rows(
@@ -120,7 +149,7 @@ def _rows(
 
 
 def _at_start(now: Iterable[Dependency], first_state: int, first_parameter: int) -> tuple[Dependency, ...]:
-    """Returns dependencies with the states replaced by the start parameters that they follow from.
+    """Returns dependencies with attitude and rate replaced by the start parameters that they follow from.
 
     The attitude follows from all four of attitude_start, which are normalised, the rate from its own element.
     """

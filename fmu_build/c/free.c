@@ -7,9 +7,6 @@
 
 #if FREE != FREE_NEVER
 
-/* Most doublings of the first angle: a turn of 2e9 rad. */
-enum { MOST_DOUBLINGS = 33 };
-
 /* A tumble from a spin about the middle axis grows by a factor e per radian of phase at most. A rate that is tiny beside
    the others is followed in pieces of LONGEST_TINY until it is not, or for so many pieces that it never will be. */
 static const double TINY = 0x1p-400;
@@ -87,26 +84,35 @@ static Status free_piece(Instance *instance, double x[], double *time, bool whol
         scaled = scale(instance, x, taken);
         phase = phase_of(instance, &scaled);
     }
-    int doublings = 0;
-    if (!(phase <= FIRST_ANGLE)) frexp(phase / FIRST_ANGLE, &doublings);
-    if (!isfinite(phase) || !isfinite(scaled.time) || doublings > MOST_DOUBLINGS)
+    bool finite = isfinite(phase);
+    if (finite) {
+        int doublings = 0;
+        if (phase > FIRST_ANGLE) frexp(phase / FIRST_ANGLE, &doublings);
+        follow(instance, &scaled, doublings, next);
+        for (size_t i = 0; i < STATE_COUNT; i++) finite = finite && isfinite(next[i]);
+    }
+    if (!finite)
         return instance_refuse(instance,
-                               "free motion over %.10g s with angular_velocity = (%.10g, %.10g, %.10g) rad/s: it can be "
-                               "followed for about %.2g rad",
-                               *time, x[4], x[5], x[6], ldexp(FIRST_ANGLE, MOST_DOUBLINGS));
-    follow(instance, &scaled, doublings, next);
-    for (size_t i = 0; i < STATE_COUNT; i++)
-        if (!isfinite(next[i]))
-            return instance_refuse(instance,
-                                   "free motion over %.10g s from angular_velocity = (%.10g, %.10g, %.10g) rad/s leaves "
-                                   "the range of finite numbers",
-                                   *time, x[4], x[5], x[6]);
+                               "free motion over %.10g s from angular_velocity = (%.10g, %.10g, %.10g) rad/s leaves "
+                               "the range of finite numbers",
+                               *time, x[4], x[5], x[6]);
     memcpy(x, next, sizeof next);
     *time -= taken;
     return STATUS_OK;
 }
 
+bool free_reaches(const double x[], double time) {
+    const double a = x[4] * time, b = x[5] * time, c = x[6] * time;
+    return a * a + b * b + c * c <= LARGEST_TURN * LARGEST_TURN;
+}
+
 Status free_motion(Instance *instance, const double x[], double time, double next[]) {
+    if (!free_reaches(x, time))
+        return instance_refuse(instance,
+                               "free motion over %.10g s with angular_velocity = (%.10g, %.10g, %.10g) rad/s turns the "
+                               "body by %.3g rad; it is followed for %g rad in a step",
+                               time, x[4], x[5], x[6], hypot(hypot(x[4] * time, x[5] * time), x[6] * time),
+                               LARGEST_TURN);
     composite_refresh_axes(instance);
     memcpy(next, x, STATE_COUNT * sizeof(double));
     if (x[4] == 0.0 && x[5] == 0.0 && x[6] == 0.0) return STATUS_OK;

@@ -221,7 +221,10 @@ void composite_scale_variation(const Instance *instance, double p[]);
    wants it to end early. */
 Status solver_step(Instance *instance, double time, double h, bool *ended_early);
 
-/* free.c: carries a state on by a time [s] of motion without torque. */
+/* free.c: whether motion without torque from a state over a time [s] turns little enough to be followed. */
+bool free_reaches(const double x[], double time);
+
+/* Carries a state on by a time [s] of motion without torque. */
 Status free_motion(Instance *instance, const double x[], double time, double next[]);
 
 /* derivatives.c: partial derivatives of outputs and rates by inputs and states, at what the outputs are now;

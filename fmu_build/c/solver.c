@@ -12,10 +12,6 @@ static const double MOST_SUB_STEPS = 1e7;
 static const double MOST_SUB_STEPS = 1e6; /* of about ten times the work */
 #endif
 
-#if FREE == FREE_ALWAYS || FREE == FREE_WHILE_FREE
-static const double LARGEST_TURN = 2e9; /* rad */
-#endif
-
 static const double HALF_ULP = 0.5 * DBL_EPSILON;
 
 #if STEPS != STEPS_BY_ANGLE
@@ -274,27 +270,20 @@ static Status refuse_action(Instance *instance) {
    too many turns away, from now on. */
 static Status free_step(Instance *instance, Progress *progress) {
     Dynamics *now = &instance->now;
-    double *x = instance_x(instance), next[STATE_COUNT], elapsed = progress->h, rest = 0.0;
-    const double speed = length_of(x + 4);
-    if (!(speed * progress->h <= LARGEST_TURN))
-        return instance_refuse(instance,
-                               "communicationStepSize = %.10g s: turns the body by %.3g rad with angular_velocity = "
-                               "(%.10g, %.10g, %.10g) rad/s; free motion is followed for %g rad in a step",
-                               progress->h, speed * progress->h, x[4], x[5], x[6], LARGEST_TURN);
-    const bool goes_on = now->epoch_holds && !progress->composite_changed &&
-                         speed * (now->elapsed + progress->h) <= LARGEST_TURN;
-    if (goes_on) { /* Knuth's sum: elapsed and rest together are exact */
-        elapsed = now->elapsed + progress->h;
-        const double added = elapsed - now->elapsed;
-        rest = now->elapsed_rest + ((now->elapsed - (elapsed - added)) + (progress->h - added));
-    }
+    double *x = instance_x(instance), next[STATE_COUNT];
+    double elapsed = now->elapsed + progress->h; /* Knuth's sum: elapsed and rest together are exact */
+    const double added = elapsed - now->elapsed;
+    double rest = now->elapsed_rest + ((now->elapsed - (elapsed - added)) + (progress->h - added));
+    const bool goes_on =
+        now->epoch_holds && !progress->composite_changed && free_reaches(now->epoch, elapsed + rest);
+    if (!goes_on) elapsed = progress->h, rest = 0.0;
     const Status status = free_motion(instance, goes_on ? now->epoch : x, elapsed + rest, next);
     if (status != STATUS_OK) return status;
     if (!goes_on) memcpy(now->epoch, x, sizeof now->epoch);
     now->elapsed = elapsed;
     now->elapsed_rest = rest;
     now->epoch_holds = true;
-    progress->error = 8.0 * HALF_ULP * (1.0 + speed * progress->h);
+    progress->error = 8.0 * HALF_ULP * (1.0 + length_of(x + 4) * progress->h);
     memcpy(x, next, sizeof next);
     progress->remaining = 0.0;
     return STATUS_OK;

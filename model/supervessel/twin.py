@@ -50,7 +50,8 @@ class Twin:
     scene      : from `load_scene`
     propagator : "rk4" and so on, instead of the scene's
     doublings  : of free motion, "exact" and "split", in a step: room for a phase of FIRST_ANGLE 2^doublings,
-                 about the angle turned; where more is needed the step is NaN, as is "exact" with a torque
+                 about the angle turned; where more is needed the step is NaN, as it is beyond 2e9 rad (which
+                 the FMU discards) and as is "exact" with a torque
 
     Derivatives of a step are right wherever values are, with one exception: those of free motion by p need
     principal axes. They are off by about 1e-15/gap, relatively, gap being the least difference of principal

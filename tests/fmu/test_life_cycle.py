@@ -11,7 +11,20 @@ import pytest
 from fmpy.fmi2 import fmi2LastSuccessfulTime, fmi2Terminated
 
 from supervessel import reference
-from support import DISCARD, EPS, ERROR, ISS_DG, OK, Instance, body, flying, relative_error, scene, variant
+from support import (
+    DISCARD,
+    EPS,
+    ERROR,
+    ISS_DG,
+    OK,
+    Instance,
+    body,
+    draw_inputs,
+    flying,
+    relative_error,
+    scene,
+    variant,
+)
 
 SEED = 20240612
 FMI = pytest.mark.parametrize("fmi", [2, 3])
@@ -39,27 +52,18 @@ def outputs(instance: Instance) -> list[float]:
     return list(getter([instance.references[name] for name in names]))
 
 
-def draw(generator: np.random.Generator) -> dict[str, Any]:
-    """Returns usable values for the inputs of the ISS with its ship."""
-    return {
-        "DG.mass": generator.uniform(11e3, 24.5e3),
-        "DG.pmi": np.array([15.5, 22.1, 20.0]) * generator.uniform(0.8, 1.2),
-        "DG.nose.position": generator.normal([0.0, -0.49, -10.0], 0.5),
-        "DG.nose.direction": generator.normal([0.0, 0.0, -1.0], 0.2),
-        "DG.nose.alignment": generator.normal([0.0, 2.0, 0.0], 0.2),
-        "torque": generator.normal(size=3) * 1e4,
-    }
-
-
 def programme(instance: Instance, seed: int, steps: int = 25) -> Iterator[list[float]]:
     """Initialises an instance and flies it with inputs and step sizes drawn; yields the outputs each time."""
     generator = np.random.default_rng(seed)
     assert instance.enter() == OK
-    assert instance.set(draw(generator) | {"angular_velocity_start": generator.normal(size=3) * 0.1}) == OK
+    assert (
+        instance.set(draw_inputs(generator) | {"angular_velocity_start": generator.normal(size=3) * 0.1})
+        == OK
+    )
     yield outputs(instance)
     assert instance.exit() == OK
     for _ in range(steps):
-        assert instance.set(draw(generator)) == OK
+        assert instance.set(draw_inputs(generator)) == OK
         yield outputs(instance)
         assert instance.step(generator.uniform(0.01, 5.0)) == OK
         yield outputs(instance)
@@ -69,7 +73,10 @@ def exchange(instance: Instance, seed: int, moves: int = 25) -> Iterator[list[fl
     """Takes an instance of model exchange through its modes, inputs and states drawn; yields the outputs."""
     generator = np.random.default_rng(seed)
     assert instance.enter() == OK
-    assert instance.set(draw(generator) | {"angular_velocity_start": generator.normal(size=3) * 0.1}) == OK
+    assert (
+        instance.set(draw_inputs(generator) | {"angular_velocity_start": generator.normal(size=3) * 0.1})
+        == OK
+    )
     yield outputs(instance)
     assert instance.exit() == OK
     yield outputs(instance)
@@ -79,7 +86,7 @@ def exchange(instance: Instance, seed: int, moves: int = 25) -> Iterator[list[fl
             "state.attitude": generator.normal(size=4),
             "state.angular_velocity": generator.normal(size=3) * 0.1,
         }
-        assert instance.set(draw(generator) | states) == OK
+        assert instance.set(draw_inputs(generator) | states) == OK
         assert instance._status(instance.fmu.setTime, generator.uniform(0.0, 10.0)) == OK
         yield [*outputs(instance), instance.get("time")]
 
@@ -163,7 +170,7 @@ def test_freeing_an_instance_leaves_the_others_alone(fmi):
 def spoil(instance: Instance, moment: str) -> None:
     """Brings a fresh instance, inputs and parameters changed, to a moment of its life."""
     rates = {"angular_velocity_start": [1.0, 2.0, 3.0], "attitude_start": [0.0, 0.0, 5.0, 0.0]}
-    instance.set(draw(np.random.default_rng(SEED)) | rates)
+    instance.set(draw_inputs(np.random.default_rng(SEED)) | rates)
     if moment != "instantiated":
         assert instance.enter(start=17.0, stop=18.0) == OK
     if moment not in ("instantiated", "initialising"):
@@ -223,7 +230,7 @@ def test_reset_gives_the_outputs_of_a_new_instance(fmi, moment):
 def spoil_exchange(instance: Instance, moment: str) -> None:
     """Brings a fresh instance of model exchange, everything changed that can be, to a moment of its life."""
     rates = {"angular_velocity_start": [1.0, 2.0, 3.0], "attitude_start": [0.0, 0.0, 5.0, 0.0]}
-    instance.set(draw(np.random.default_rng(SEED)) | rates)
+    instance.set(draw_inputs(np.random.default_rng(SEED)) | rates)
     if moment != "instantiated":
         assert instance.enter(start=17.0, stop=18.0) == OK
     if moment not in ("instantiated", "initialising"):
@@ -367,7 +374,7 @@ def test_a_step_reports_its_end_as_the_last_successful_time(fmi):
 @FMI
 def test_outputs_at_the_start_follow_from_what_was_set(fmi, seed, set_, read):
     generator = np.random.default_rng(seed)
-    values = draw(generator) | {
+    values = draw_inputs(generator) | {
         "angular_velocity_start": generator.normal(size=3),
         "attitude_start": generator.normal(size=4) * 10.0,
     }
@@ -389,7 +396,7 @@ def test_outputs_at_the_start_follow_from_what_was_set(fmi, seed, set_, read):
 
 @FMI
 def test_outputs_between_steps_follow_from_inputs_and_state(fmi):
-    values = draw(np.random.default_rng(SEED))
+    values = draw_inputs(np.random.default_rng(SEED))
     with flying(SPINNING, fmi) as instance:
         assert instance.step(10.0) == OK
         assert instance.set(values) == OK
@@ -419,7 +426,7 @@ def test_a_change_of_mass_or_pose_keeps_angular_velocity_and_attitude(fmi):
         instance.step(10.0)
         names = "angular_velocity", "attitude", "state.angular_velocity", "state.attitude"
         before = [x for name in names for x in instance.get(name)]
-        instance.set(draw(np.random.default_rng(SEED)))
+        instance.set(draw_inputs(np.random.default_rng(SEED)))
         assert [x for name in names for x in instance.get(name)] == before
 
 
@@ -560,7 +567,7 @@ def test_outputs_that_do_not_depend_on_changed_inputs_compute_nothing(fmi):
 
 @FMI
 def test_inputs_are_read_back_as_set(fmi):
-    values = draw(np.random.default_rng(SEED))
+    values = draw_inputs(np.random.default_rng(SEED))
     with flying(ISS_DG, fmi) as instance:
         instance.set(values)
         for _ in range(2):

@@ -12,7 +12,19 @@ from fmpy.fmi2 import fmi2EventInfo
 from scipy.integrate import solve_ivp
 
 from supervessel import reference
-from support import DISCARD, EPS, ERROR, ISS_DG, OK, Instance, built, relative_error, scene, variant
+from support import (
+    DISCARD,
+    EPS,
+    ERROR,
+    ISS_DG,
+    OK,
+    Instance,
+    built,
+    draw_inputs,
+    relative_error,
+    scene,
+    variant,
+)
 
 SEED = 20240611
 FMI = pytest.mark.parametrize("fmi", [2, 3])
@@ -79,14 +91,7 @@ def update(instance: Instance) -> Any:
 def draw(seed: int) -> tuple[dict[str, Any], np.ndarray]:
     """Returns usable inputs of the ISS with its ship, and states with an attitude of unit length."""
     generator = np.random.default_rng(seed)
-    inputs = {
-        "DG.mass": generator.uniform(11e3, 24.5e3),
-        "DG.pmi": np.array([15.5, 22.1, 20.0]) * generator.uniform(0.8, 1.2),
-        "DG.nose.position": generator.normal([0.0, -0.49, -10.0], 0.5),
-        "DG.nose.direction": generator.normal([0.0, 0.0, -1.0], 0.2),
-        "DG.nose.alignment": generator.normal([0.0, 2.0, 0.0], 0.2),
-        "torque": generator.normal(size=3) * 1e4,
-    }
+    inputs = draw_inputs(generator)
     attitude = generator.normal(size=4)
     return inputs, np.concatenate([attitude / np.linalg.norm(attitude), 0.1 * generator.normal(size=3)])
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from support import DISCARD, ERROR, ISS_DG, OK, Instance, body, variant
+from support import DISCARD, ERROR, ISS_DG, OK, Instance, body, draw_inputs, variant
 
 SEED = 20240613
 FMI = pytest.mark.parametrize("fmi", [2, 3])
@@ -31,15 +31,7 @@ MOMENT = pytest.mark.parametrize(
 
 def draw(seed: int) -> dict[str, Any]:
     """Returns usable inputs."""
-    generator = np.random.default_rng(seed)
-    return {
-        "DG.mass": generator.uniform(11e3, 24.5e3),
-        "DG.pmi": np.array([15.5, 22.1, 20.0]) * generator.uniform(0.8, 1.2),
-        "DG.nose.position": generator.normal([0.0, -0.49, -10.0], 0.5),
-        "DG.nose.direction": generator.normal([0.0, 0.0, -1.0], 0.2),
-        "DG.nose.alignment": generator.normal([0.0, 2.0, 0.0], 0.2),
-        "torque": generator.normal(size=3) * 1e4,
-    }
+    return draw_inputs(np.random.default_rng(seed))
 
 
 def start(fmi: int, exchange: bool, moment: str, seed: int = SEED) -> Instance:

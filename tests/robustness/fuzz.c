@@ -346,7 +346,7 @@ static void make_instance(Slot *slot) {
     memset(slot, 0, sizeof *slot);
     slot->exchange = once_in(2);
     slot->has_log = !once_in(8);
-    const bool good = instantiate(slot, name, token, log_on) && name && name[0] == 'i' && token && token[1] != '0';
+    const bool good = instantiate(slot, name, token, log_on) && name && name[0] == 'i' && token == MODEL_TOKEN;
     if (good != (slot->component != NULL)) fail("an instance is made if and only if all arguments are right", slot, OK);
     if (slot->lines != (!good && slot->has_log)) fail("only a refused instantiation logs one line", slot, OK);
     slot->log_mask = slot->has_log && log_on ? 3 : 0;

@@ -1,15 +1,15 @@
 """Reference solutions of the rotation of a rigid body, kept in truth.json, and the script that makes them.
 
-    python tests/stability/truth.py     (ten minutes; the same bytes each time)
+    python -m stability.truth     (in tests; ten minutes, the same bytes each time)
 
     I w' + w x (I w) = M,  q' = q (0, w)/2,  q body to inertial, w and constant M in body axes
 
 The inputs of a case are doubles and taken as exact; the results are right to the 34 digits kept. Two ways
 lead to them. Without torque: Jacobi's functions by theta functions, and Euler angles about the momentum with
 the integral of the third kind in Carlson's form, in principal axes found at 120 digits (`free`). With torque:
-a Taylor series in integer arithmetic on the tensor as it stands, 60 digits (`taylor`). Every case without
-torque that turns by 20 rad or less is solved both ways, and of the longer ones those whose period is short
-enough: the Taylor series over one period, raised to the number of periods, and over what remains
+a Taylor series in integer arithmetic on the tensor as it stands, 60 digits (`support.series`). Every case
+without torque that turns by 20 rad or less is solved both ways, and of the longer ones those whose period is
+short enough: the Taylor series over one period, raised to the number of periods, and over what remains
 (`by_periods`).
 """
 
@@ -24,18 +24,16 @@ from random import Random
 from time import perf_counter
 from typing import Any
 
-import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
+from support.series import Matrix, Number, Vector, mp, taylor
+from support.series import apply as _apply
+from support.series import norm as _norm
+from support.series import times as _times
+
 FILE = Path(__file__).with_name("truth.json")
 DIGITS = 34  # kept of each result
-
-mp = mpmath.MPContext()  # its own, so that the precision of others stays as it is
-mp.dps = 120
-Number = Any  # mpf of this context
-Vector = list[Number]
-Matrix = list[list[Number]]
 
 PERTURBATION = mp.mpf(10) ** -25
 STEADY = (
@@ -153,29 +151,12 @@ def _read() -> tuple[Case, ...]:
 # Vectors and quaternions (scalar first, Hamilton product)
 
 
-def _norm(v: Sequence[Number]) -> Number:
-    return mp.sqrt(sum(x * x for x in v))
-
-
 def _cross(a: Vector, b: Vector) -> Vector:
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
-def _apply(matrix: Matrix, v: Vector) -> Vector:
-    return [sum(map(mul, row, v)) for row in matrix]
-
-
 def _transposed(matrix: Matrix) -> Matrix:
     return [list(column) for column in zip(*matrix, strict=True)]
-
-
-def _times(a: Vector, b: Vector) -> Vector:
-    return [
-        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-        a[0] * b[2] + a[2] * b[0] + a[3] * b[1] - a[1] * b[3],
-        a[0] * b[3] + a[3] * b[0] + a[1] * b[2] - a[2] * b[1],
-    ]
 
 
 def _conjugate(q: Vector) -> Vector:
@@ -324,100 +305,6 @@ def free(inertia: Matrix, omega: Vector, time: Number) -> tuple[Vector, Vector]:
     (start, q_start, _), (end, q_end, w) = circulation.state(mp.zero), circulation.state(time)
     turn = _times(_conjugate(q_start), _times(_about(2, end - start), q_end))
     return [turn[0], *_apply(axes, turn[1:])], _apply(axes, w)
-
-
-# Taylor series in integers
-
-
-def _conv(a: list[int], b: list[int]) -> int:
-    """Returns the last coefficient of a product of two series of equal length."""
-    return sum(map(mul, a, reversed(b)))
-
-
-def taylor(
-    inertia: Matrix, omega: Vector, torque: Vector, time: Number, digits: int = 60
-) -> tuple[Vector, Vector]:
-    """Returns the turn q0* q(time), (4,), and the rate (3,), in body axes, to about `digits` digits.
-
-    The span is the unit of time, numbers are multiples of 2^-B. Each step takes a unit 2^-k of its own that
-    makes the rate 1 or less, and as much of it as leaves the last two coefficients below the precision.
-    """
-    size = _norm(omega) * abs(time)
-    scale = max(abs(x) for row in inertia for x in row)
-    scaled = mp.matrix(inertia) / scale
-    inverse = mp.inverse(scaled)
-    push = _apply(
-        [[inverse[i, j] for j in range(3)] for i in range(3)], [x / scale * time**2 for x in torque]
-    )
-    fastest = max(size, mp.sqrt(_norm(push)))
-    if not fastest:
-        return [mp.one, mp.zero, mp.zero, mp.zero], omega
-    small = min(fastest, mp.one) if not size else min(size, mp.one)
-    stiff = max(abs(x) for x in inverse)
-    B = int(digits * 3.322 - mp.log(small, 2) + mp.log(stiff, 2)) + 64
-    one, order = 1 << B, int(1.15 * digits)
-    floor = B - digits * 3.322 + float(mp.log(small, 2))  # log2 of the largest term to be left out
-
-    def fixed(x: Number) -> int:
-        return int(mp.nint(mp.ldexp(x, B)))
-
-    with mp.workprec(max(mp.prec, 2 * B)):
-        tensor = [[fixed(scaled[i, j]) for j in range(3)] for i in range(3)]
-        inverse = mp.inverse(scaled)
-        reciprocal = [[fixed(inverse[i, j]) for j in range(3)] for i in range(3)]
-        W, T = [fixed(x * time) for x in omega], [fixed(x) for x in push]
-    q = [one, 0, 0, 0]
-    left, whole = 1 << 64, 64
-    while left:
-        rate = max(max(map(abs, W)) / one, math.sqrt(max(map(abs, T)) / one))
-        k = max(0, math.ceil(math.log2(rate)) if rate > 0 else 0)
-        w, p = [[x >> k] for x in W], [[x] for x in q]
-        L: list[list[int]] = [[], [], []]
-        for j in range(order):
-            for i in range(3):
-                L[i].append(sum(tensor[i][n] * w[n][j] for n in range(3)) >> B)
-            gyro = [
-                _conv(w[1], L[2]) - _conv(w[2], L[1]),
-                _conv(w[2], L[0]) - _conv(w[0], L[2]),
-                _conv(w[0], L[1]) - _conv(w[1], L[0]),
-            ]
-            a, b, c, d = p
-            x, y, z = w
-            turn = [
-                -_conv(b, x) - _conv(c, y) - _conv(d, z),
-                _conv(a, x) + _conv(c, z) - _conv(d, y),
-                _conv(a, y) + _conv(d, x) - _conv(b, z),
-                _conv(a, z) + _conv(b, y) - _conv(c, x),
-            ]
-            for i in range(3):
-                change = -(sum(reciprocal[i][n] * (gyro[n] >> B) for n in range(3)) >> B)
-                w[i].append((change + (T[i] >> 2 * k if j == 0 else 0)) // (j + 1))
-            for i in range(4):
-                p[i].append((turn[i] >> B + 1) // (j + 1))
-        part = 1.0
-        for n in (order - 1, order):
-            last = max(abs(series[n]) for series in (*w, *p))
-            if last:
-                part = min(part, 2.0 ** ((floor - _log2(last)) / n))
-        step = max(1, int(part * 2**20)) << (whole - k - 20)
-        step = min(step, left)
-        left -= step
-        s = step << (B - whole + k)
-
-        def at(series: list[int], s: int = s) -> int:
-            value = 0
-            for coefficient in reversed(series):
-                value = (value * s >> B) + coefficient
-            return value
-
-        W, q = [at(series) << k for series in w], [at(series) for series in p]
-    with mp.workprec(max(mp.prec, B)):
-        return [mp.ldexp(mp.mpf(x), -B) for x in q], [mp.ldexp(mp.mpf(x), -B) / time for x in W]
-
-
-def _log2(n: int) -> float:
-    shift = max(0, n.bit_length() - 64)
-    return math.log2(n >> shift) + shift
 
 
 # A problem, its answer and its condition

@@ -81,6 +81,18 @@ def variant(raw: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any
     return new
 
 
+def draw_inputs(generator: np.random.Generator) -> dict[str, Any]:
+    """Returns usable values for all inputs of ISS_DG."""
+    return {
+        "DG.mass": generator.uniform(11e3, 24.5e3),
+        "DG.pmi": np.array([15.5, 22.1, 20.0]) * generator.uniform(0.8, 1.2),
+        "DG.nose.position": generator.normal([0.0, -0.49, -10.0], 0.5),
+        "DG.nose.direction": generator.normal([0.0, 0.0, -1.0], 0.2),
+        "DG.nose.alignment": generator.normal([0.0, 2.0, 0.0], 0.2),
+        "torque": generator.normal(size=3) * 1e4,
+    }
+
+
 def body(mass: float = 1000.0, pmi: Sequence[float] = (1.0, 2.0, 2.5), **rotation: Any) -> dict[str, Any]:
     """Returns the raw scene of a single body with torque inputs and every output."""
     return {
@@ -265,9 +277,13 @@ def flying(raw: Mapping[str, Any], fmi: int = 3, **values: Any) -> Iterator[Inst
 
 
 def scene(raw: Mapping[str, Any]) -> Scene:
-    """Returns the scene of a raw one; propagated by RK4 unless it says otherwise: steps can be foretold."""
-    propagator = raw.get("rotation", {}).get("propagator", "rk4")
-    return parse_scene(variant(raw, {"rotation.propagator": propagator}))
+    """Returns the scene of a raw one; where it does not say otherwise propagated by RK4, whose steps can be
+    foretold, and keeping the angular velocity when poses change."""
+    given = raw.get("rotation", {})
+    unless = {"rotation.propagator": "rk4"}
+    if raw.get("inputs", {}).get("pose") and not raw["inputs"].get("motion"):
+        unless["rotation.pose_change"] = "rate"
+    return parse_scene(variant(raw, {k: given.get(k.removeprefix("rotation."), v) for k, v in unless.items()}))
 
 
 def relative_error(value: Any, truth: Any) -> float:
@@ -299,6 +315,7 @@ __all__ = [
     "Instance",
     "body",
     "built",
+    "draw_inputs",
     "flying",
     "random_rotation",
     "relative_error",

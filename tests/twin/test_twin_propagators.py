@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from supervessel import Twin
-from supervessel.propagators.free_motion import FIRST_ANGLE
+from supervessel.propagators.free_motion import FIRST_ANGLE, LARGEST_TURN
 from support import EPS, ISS_DG, OK, body, flying, random_rotation, scene, variant
 
 Array = NDArray[np.float64]
@@ -145,6 +145,16 @@ def test_free_motion_beyond_the_twins_room_is_nan_and_within_it_the_fmus(doublin
         assert_same(x_next, end, factor * room)
     for factor in (1.0 + 1e-12, 2.0, 1e6):
         assert np.isnan(numbers(twin.step(twin.x_start, [0.0] * 3, twin.p_start, factor * room))).all()
+
+
+@pytest.mark.parametrize("propagator", ["exact", "split"])
+@pytest.mark.parametrize(("pmi", "doublings"), [((2.0, 2.0, 2.0), 0), ((1.0, 2.0, 2.5), 40)])
+def test_free_motion_of_too_many_turns_is_nan(pmi, doublings, propagator):
+    twin = Twin(scene(body(1000.0, pmi, propagator=propagator, angular_velocity=RATES)), doublings=doublings)
+    reach = LARGEST_TURN / np.linalg.norm(RATES)
+    for h, followed in ((0.999, True), (-0.999, True), (1.001, False), (-1.001, False), (1e200, False)):
+        x_next = numbers(twin.step(twin.x_start, [0.0] * 3, twin.p_start, h * reach))
+        assert np.isfinite(x_next).all() if followed else np.isnan(x_next).all()
 
 
 def test_backwards_is_back_at_the_start():

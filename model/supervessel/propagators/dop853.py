@@ -64,7 +64,7 @@ STAGES: tuple[Mapping[int, float], ...] = (
         10: 0.6433927460157636,
     },
 )
-"""For each stage the weights of the rates before it, by their number. Source: [HNW] appendix, code DOP853."""
+"""For each stage the weights of the rates before it, by their number. Source: [HNW], code DOP853."""
 
 WEIGHTS: Mapping[int, float] = {
     0: 0.054293734116568765,
@@ -76,7 +76,7 @@ WEIGHTS: Mapping[int, float] = {
     10: 0.20136540080403034,
     11: 0.04471061572777259,
 }
-"""Of the rates in the step. Source: [HNW] appendix, code DOP853."""
+"""Of the rates in the step. Source: [HNW], code DOP853."""
 
 FIFTH_ORDER: Mapping[int, float] = {
     0: 0.01312004499419488,
@@ -88,10 +88,10 @@ FIFTH_ORDER: Mapping[int, float] = {
     10: 0.08192320648511571,
     11: -0.022355307863886294,
 }
-"""WEIGHTS less those of the embedded method of order 5. Source: [HNW] appendix, code DOP853."""
+"""WEIGHTS less those of the embedded method of order 5. Source: [HNW], code DOP853."""
 
 THIRD_ORDER: Mapping[int, float] = {0: 0.2440944881889764, 8: 0.7338466882816118, 11: 0.022058823529411766}
-"""Weights of the embedded method of order 3. Source: [HNW] appendix, code DOP853."""
+"""Weights of the embedded method of order 3. Source: [HNW], code DOP853."""
 
 
 def dop853_step(ode: Callable[[ca.SX], ca.SX], state: ca.SX, step: ca.SX) -> tuple[ca.SX, ca.SX]:
@@ -118,7 +118,7 @@ def _weighted(rates: Sequence[ca.SX], weights: Mapping[int, float]) -> ca.SX:
 
 
 def _combined(fifth: ca.SX, third: ca.SX) -> ca.SX:
-    """Returns |e5|^2 / sqrt(|e5|^2 + 0.01 |e3|^2), zero where both vanish. Source: [HNW] section II.10."""
+    """Returns |e5|^2 / sqrt(|e5|^2 + 0.01 |e3|^2), zero where both vanish. Source: [HNW], code DOP853."""
     square = ca.sumsqr(fifth)
     total = square + 0.01 * ca.sumsqr(third)
     return square / ca.sqrt(ca.if_else(total > 0.0, total, 1.0))
@@ -133,7 +133,7 @@ PROPAGATOR = Propagator(
     build,
     "error",
     "never",
-    "The Runge-Kutta method DOP853 of order 8 ([HNW] section II.5). A communication step is divided so that "
+    "The Runge-Kutta method DOP853 of order 8 ([HNW], code DOP853). A communication step is divided so that "
     "the estimated error of the attitude at its end stays below <code>tolerance</code>.",
     safety=5.0,
 )

@@ -55,7 +55,7 @@ def free_step(state: ca.SX, moments: ca.SX, to_body: ca.SX, time: ca.SX, doublin
     moments   : principal, (3,), ascending; any unit
     to_body   : R_body_principal, (3, 3)
     time      : [s]
-    doublings : room for that many; NaN where more are needed
+    doublings : room for that many; NaN where more are needed, or the body turns by more than LARGEST_TURN
     """
     omega = to_body.T @ state[4:]
     fastest = ca.fmax(ca.mmax(ca.fabs(omega)), SLOWEST)

@@ -28,6 +28,12 @@ from supervessel.attitude import unit
 FIRST_ANGLE = 0.25
 """Largest phase, as of `phase`, that the series covers."""
 
+LARGEST_TURN = 2e9
+"""Most that a step turns the body [rad], at the rate it begins with: what u of it leaves is 2e-7 rad.
+
+A spin that is steady needs no doublings however long it lasts: they are no limit.
+"""
+
 SERIES_TERMS = 8
 """Highest power of t^2 in the series of Weierstrass's function.
 
@@ -203,10 +209,13 @@ def finish(moments: ca.SX, omega: ca.SX, time: ca.SX, s: ca.SX) -> tuple[ca.SX, 
 def free_turn(moments: ca.SX, omega: ca.SX, time: ca.SX, doublings: int) -> tuple[ca.SX, ca.SX]:
     """Returns what `finish` does, after as many doublings as it takes.
 
-    doublings : the most there is room for. Where more are needed all results are NaN.
+    doublings : the most there is room for
+
+    Where more are needed, or the body turns by more than LARGEST_TURN, all results are NaN.
     """
     angle = phase(moments, omega, time)
     needed = [angle > FIRST_ANGLE * 2.0**i for i in range(doublings + 1)]
+    beyond = ca.logic_or(needed[-1], ca.sumsqr(omega * time) > LARGEST_TURN**2)
     share = ca.SX(1.0)
     for more in needed[:-1]:
         share = share * ca.if_else(more, 0.5, 1.0)
@@ -214,7 +223,7 @@ def free_turn(moments: ca.SX, omega: ca.SX, time: ca.SX, doublings: int) -> tupl
     for more in needed[:-1]:
         s = ca.vertcat(ca.if_else(more, double(s)[:VARYING], s[:VARYING]), s[VARYING:])
     turn, end = finish(moments, omega, time, s)
-    return ca.if_else(needed[-1], ca.SX.nan(), turn), ca.if_else(needed[-1], ca.SX.nan(), end)
+    return ca.if_else(beyond, ca.SX.nan(), turn), ca.if_else(beyond, ca.SX.nan(), end)
 
 
 def _guarded(omega: ca.SX, time: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
