@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fmu_build.figure import Figure, Group, Item, Path, Point, Text, arrow, regular_polygon, sector
-from fmu_build.geometry import Assembly, DrawnPort, DrawnVessel
+from fmu_build.geometry import Assembly, DrawnPoint, DrawnPort, DrawnVessel
 
 Array = NDArray[np.float64]
 Area = tuple[float, float, float, float]
@@ -35,6 +35,7 @@ LIGHT = np.array([2.0, 5.0, 3.0]) / sqrt(38.0)
 SMALLEST_EXTENT = 1e-100  # m; what is smaller has no size that a scale could be taken from
 SMALLEST_BOX = 4.0  # px; what is smaller in a view is a dot
 NAME_LENGTH = 18  # letters of a name that a drawing shows
+NAMES_IN_A_NOTE = 6
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ def drawing(parts: Assembly) -> Figure:
     points = _points(parts)
     main = _panel(ISOMETRIC, MAIN_AREA, points)
     small = [_panel(view, area, points) for view, area in zip(SMALL_VIEWS, SMALL_AREAS, strict=True)]
-    count = len(scene.vessels)
+    count = len(parts.poses)
     vessels = f"{count} vessel{'s' if count > 1 else ''}"
     items: list[Item] = [
         Text((20.0, 28.0), _short(scene.name, 60), size=17.0, colour=DARK),
@@ -132,6 +133,7 @@ def _points(parts: Assembly, ports: bool = True) -> Array:
     points = [vessel.centre[None, :] for vessel in parts.vessels]
     points += [vessel.corners.reshape(8, 3) for vessel in parts.vessels if not vessel.massless]
     points += [port.position[None, :] for port in parts.ports if ports]
+    points += [point.position[None, :] for point in parts.points if ports]
     if parts.barycentre is not None and ports and not parts.vessels_omitted:
         points.append(parts.barycentre[None, :])
     return np.vstack([*points, np.zeros((0, 3))])
@@ -169,6 +171,7 @@ def _main_view(parts: Assembly, panel: Panel) -> Group:
             *boxes,
             *_names(parts.vessels, panel),
             *(_port(port, panel, length) for port in parts.ports),
+            *(_force_point(point, panel) for point in parts.points),
             _body_axes(parts, panel, 56.0),
             _scale_bar(panel.scale, (left + width, top + height + 58.0)),
             Text((20.0, top + height + 58.0), panel.view.caption, colour=GREY),
@@ -186,6 +189,7 @@ def _small_view(parts: Assembly, panel: Panel) -> Group:
         for item in _vessel(vessel, panel, 1.0, paint=0.45)
     ]
     items += [_port(port, panel, length) for port in parts.ports]
+    items += [_force_point(point, panel) for point in parts.points]
     items.append(_body_axes(parts, panel, 34.0))
     items += _numbers(parts, panel)
     items.append(_scale_bar(panel.scale, (left + width, top + height + 34.0)))
@@ -253,7 +257,17 @@ def _port(port: DrawnPort, panel: Panel, length: float) -> Group:
     tick = panel.along(port.position, port.alignment, 0.45 * length)
     items.append(Path((position, tick), stroke=colour, width=3.0))
     items.append(Path(regular_polygon(position, 2.5, 12), fill=DARK, closed=True))
+    if port.switchable:
+        items.append(Path(regular_polygon(position, 8.0, 24), stroke=DARK, dash=2.5, closed=True))
     return Group("port", items, port.name)
+
+
+def _force_point(point: DrawnPoint, panel: Panel) -> Group:
+    """Returns a point where a force acts: a cross."""
+    colour = COLOURS[(point.vessel.number - 1) % len(COLOURS)]
+    x, y = panel.at(point.position)
+    lines = [((x - 4.0, y - s), (x + 4.0, y + s)) for s in (-4.0, 4.0)]
+    return Group("point", [Path(line, stroke=colour, width=2.0) for line in lines], point.name)
 
 
 def _arrow_length(parts: Assembly) -> float:
@@ -368,6 +382,10 @@ def _notes(parts: Assembly) -> list[str]:
         notes.append(
             "Docking ports: arrow outwards, thick tick along alignment, dotted line to the vessel's centre."
         )
+    if any(port.switchable for port in parts.ports):
+        notes.append("A dashed ring is around a port whose dock can open and close.")
+    if parts.points:
+        notes.append("A cross is a point where a force acts.")
     if any(vessel.massless for vessel in parts.vessels):
         notes.append("A diamond is a vessel without mass.")
     omitted = [
@@ -377,6 +395,10 @@ def _notes(parts: Assembly) -> list[str]:
     ]
     if omitted:
         notes.append(f"Not drawn: {' and '.join(omitted)}.")
+    if parts.detached:
+        names = [_short(name) for name in parts.detached[:NAMES_IN_A_NOTE]]
+        others = " and others" if len(parts.detached) > NAMES_IN_A_NOTE else ""
+        notes.append(f"Not docked at the start, so without a place: {', '.join(names)}{others}.")
     return notes
 
 

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supervessel import reference
-from supervessel.scene import Scene, Vessel
+from supervessel.assembly import joints, switchable
+from supervessel.scene import Inputs, Scene, Vessel
 
 Array = NDArray[np.float64]
 
@@ -48,7 +49,10 @@ class DrawnVessel:
 
 @dataclass(frozen=True)
 class DrawnPort:
-    """A docking port as drawn: position (3,) [m], direction (3,) and alignment (3,), unit, root axes."""
+    """A docking port as drawn: position (3,) [m], direction (3,) and alignment (3,), unit, root axes.
+
+    switchable : whether it belongs to a dock that an input opens and closes
+    """
 
     name: str
     vessel: DrawnVessel
@@ -56,24 +60,39 @@ class DrawnPort:
     direction: Array
     alignment: Array
     docked: bool
+    switchable: bool
+
+
+@dataclass(frozen=True)
+class DrawnPoint:
+    """A point where a force acts, as drawn: position (3,) [m], root axes."""
+
+    name: str
+    vessel: DrawnVessel
+    position: Array
 
 
 @dataclass(frozen=True)
 class Assembly:
     """A scene placed at its start values, and what of it can be drawn.
 
-    poses           : rotation R_root_vessel, (3, 3), and origin, (3,) [m], of every vessel, the root first
+    poses           : rotation R_root_vessel, (3, 3), and origin, (3,) [m], of the root, which is the first,
+                      and of every vessel that docks closed at the start join to it
+    detached        : the other vessels
     whole           : mass distribution
     barycentre      : (3,) [m], root axes, None where it is too far away to be drawn
-    vessels_omitted : vessels that are not among `vessels`
+    points          : where forces act on `vessels`
+    vessels_omitted : vessels with a pose that are not among `vessels`
     ports_omitted   : ports of those vessels that are not among `ports`
     """
 
     scene: Scene
     poses: Mapping[str, tuple[Array, Array]]
+    detached: Sequence[str]
     whole: reference.Composite
     vessels: Sequence[DrawnVessel]
     ports: Sequence[DrawnPort]
+    points: Sequence[DrawnPoint]
     barycentre: Array | None
     vessels_omitted: int
     ports_omitted: int
@@ -82,8 +101,9 @@ class Assembly:
 def assembly(scene: Scene) -> Assembly:
     """Returns a scene placed at its start values, with as many vessels and ports as a drawing can hold."""
     with np.errstate(all="ignore"):  # what overflows is not drawn
-        poses = reference.poses(scene)
-        whole = reference.composite(scene)
+        attached = _attached(scene)
+        poses = reference.poses(attached)
+        whole = reference.composite(attached)
         heaviest = sorted(poses, key=lambda name: (name != scene.root, -scene.vessels[name].mass))
         shown = frozenset(heaviest[:VESSEL_LIMIT])
         vessels = [
@@ -92,17 +112,28 @@ def assembly(scene: Scene) -> Assembly:
             if name in shown and _near((vessel := _vessel(scene, name, number, *pose)).corners)
         ]
         ports = [port for vessel in vessels for port in _ports(scene, vessel, *poses[vessel.name])]
+        points = [point for vessel in vessels for point in _force_points(scene, vessel, *poses[vessel.name])]
     ports.sort(key=lambda port: not port.docked)
     return Assembly(
         scene=scene,
         poses=poses,
+        detached=[name for name in scene.vessels if name not in poses],
         whole=whole,
         vessels=vessels,
         ports=ports[:PORT_LIMIT],
+        points=points,
         barycentre=whole.barycentre if _near(whole.barycentre) else None,
-        vessels_omitted=len(scene.vessels) - len(vessels),
+        vessels_omitted=len(poses) - len(vessels),
         ports_omitted=max(0, len(ports) - PORT_LIMIT),
     )
+
+
+def _attached(scene: Scene) -> Scene:
+    """Returns the part of a scene that docks closed at the start join to the root."""
+    names = {scene.root, *(joint.child for joint in joints(scene))}
+    closed = tuple(dock for dock in scene.docks if dock.docked and dock.ports[0].partition(".")[0] in names)
+    vessels = {name: vessel for name, vessel in scene.vessels.items() if name in names}
+    return scene.model_copy(update={"vessels": vessels, "docks": closed, "inputs": Inputs()})
 
 
 def semi_axes(moments: Sequence[float]) -> Array:
@@ -141,13 +172,22 @@ def _vessel(scene: Scene, name: str, number: int, rotation: Array, origin: Array
 
 def _ports(scene: Scene, vessel: DrawnVessel, rotation: Array, origin: Array) -> Iterator[DrawnPort]:
     """Yields the ports of a vessel that are near enough to be drawn."""
-    docked = {name for dock in scene.docks for name in dock.ports}
+    docked = {name for dock in scene.docks if dock.docked for name in dock.ports}
+    switchables = {name for dock in scene.docks if switchable(scene, dock) for name in dock.ports}
     for port_name, port in scene.vessels[vessel.name].ports.items():
         name = f"{vessel.name}.{port_name}"
         direction, alignment, _ = (rotation @ reference.port_axes(port.direction, port.alignment)).T
         position = origin + rotation @ np.array(port.position)
         if _near(position):
-            yield DrawnPort(name, vessel, position, direction, alignment, name in docked)
+            yield DrawnPort(name, vessel, position, direction, alignment, name in docked, name in switchables)
+
+
+def _force_points(scene: Scene, vessel: DrawnVessel, rotation: Array, origin: Array) -> Iterator[DrawnPoint]:
+    """Yields the points of a vessel where forces act, if near enough to be drawn."""
+    for name in scene.inputs.force:
+        position = origin + rotation @ np.array(scene.point(name).position)
+        if name.partition(".")[0] == vessel.name and _near(position):
+            yield DrawnPoint(name, vessel, position)
 
 
 def _near(positions: Array) -> bool:

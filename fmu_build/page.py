@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from fmu_build.geometry import Assembly
 from fmu_build.table import Entry, Role
-from supervessel.assembly import joints
+from supervessel.assembly import joints, switchable
 from supervessel.propagators import description
 from supervessel.reference import Composite
 from supervessel.scene import Law, Scene, Vessel
@@ -64,6 +64,36 @@ LAWS: dict[Law, tuple[str, str]] = {
 }
 """Equation and description of each rotation law, HTML."""
 
+H = "<i>h</i>"
+RHO = "<i>\N{GREEK SMALL LETTER RHO}</i><sub>j</sub>"
+
+SPINNING_LAWS: dict[Law, str] = {
+    "principal": f"{LAWS['principal'][0]}, with <i>J ω</i> + {H} in place of <i>J ω</i>",
+    "tensor": f"<i>J ω</i>{PRIME} = <i>M</i> {MINUS} <i>ω</i> {TIMES} (<i>J ω</i> + {H})",
+}
+"""Equations of the laws that the momentum h of moving ports enters, HTML; in the others it does nothing."""
+
+KEPT_BY = {
+    ("mass", "rate"): "When a mass or a moment changes, the <b>angular velocity is kept</b>: mass leaves or "
+    "arrives moving with the body.",
+    ("mass", "momentum"): "When a mass or a moment changes, the <b>angular momentum is kept</b>: mass moves "
+    "inside the assembly.",
+    ("pose", "rate"): "When a port's pose changes, the <b>angular velocity is kept</b>. For parts that are "
+    "moved inside the assembly that is a modelling error: the angular momentum is then not conserved.",
+    ("pose", "momentum"): "When a port's pose changes, the <b>angular momentum is kept</b>: the parts are "
+    "moved inside the assembly, and the angular velocity follows.",
+}
+"""What changes keep, HTML."""
+
+DOCKING = (
+    "Docks open and close between the steps of co-simulation, or in event mode. What undocks leaves with its "
+    "share of the momentum: the angular velocity of the rest is kept. What docks brings its own along: the "
+    "momentum of both parts is conserved, by the full inertia tensor under every law but none. The part of "
+    "the second port comes with the velocity and the rate, relative to the first port, that are inputs; zero "
+    "is a matched approach. A vessel that is not docked to the root's part, even through others, has no "
+    "effect on anything; its own outputs are zero."
+)
+
 STATUS = {
     2: "The answer is Discard where FMI 2.0 allows it (a step; in model exchange a get and the derivatives "
     "too), else Error.",
@@ -89,11 +119,13 @@ def page(parts: Assembly, entries: Sequence[Entry], fmi: int, picture: str) -> s
         facts=_facts(scene, fmi),
         picture=picture,
         vessels=_vessels(parts),
-        ports=_ports(scene),
+        ports=_ports(scene) + _points(scene),
         composite=_composite(parts.whole),
         variables=_variables(entries),
         law=escape(rotation.law),
-        law_equation=law_equation,
+        law_equation=SPINNING_LAWS.get(rotation.law, law_equation) if scene.inputs.motion else law_equation,
+        moments=_momentum(scene),
+        changes=_changes(scene),
         law_text=law_text,
         propagator=escape(rotation.propagator),
         propagator_text=description(scene),
@@ -104,7 +136,9 @@ def page(parts: Assembly, entries: Sequence[Entry], fmi: int, picture: str) -> s
 
 def _whole(scene: Scene) -> str:
     count = len(scene.vessels)
-    return f"an assembly of {count} docked vessels" if count > 1 else f"the vessel {escape(scene.root)}"
+    docked = " that dock and undock" if scene.inputs.docked else ""
+    kind = "vessels" if docked else "docked vessels"
+    return f"an assembly of {count} {kind}{docked}" if count > 1 else f"the vessel {escape(scene.root)}"
 
 
 def _facts(scene: Scene, fmi: int) -> str:
@@ -134,6 +168,9 @@ def _vessels(parts: Assembly) -> str:
             centre = origin + rotation @ np.array(vessel.centre_of_mass)
         moments = _moments(vessel)
         rows.append((number, name, vessel.mass, *moments, vessel.centre_of_mass, on, _rounded(centre)))
+    for name in parts.detached:
+        vessel = scene.vessels[name]
+        rows.append(("", name, vessel.mass, *_moments(vessel), vessel.centre_of_mass, "not at the start", ""))
     head = ("", "vessel", "mass [kg]", "given as", "moments", "centre of mass [m]", "docked")
     caption = "Vessels, in vessel axes; last column: centre of mass in the root vessel's axes"
     return _table(caption, (*head, "in root axes [m]"), rows)
@@ -149,14 +186,54 @@ def _moments(vessel: Vessel) -> tuple[str, Cell]:
 
 
 def _ports(scene: Scene) -> str:
-    mates = {one: other for dock in scene.docks for one, other in (dock.ports, dock.ports[::-1])}
+    mates: dict[str, list[str]] = {}
+    for dock in scene.docks:
+        state = f" ({dock.name}, {'closed' if dock.docked else 'open'} at the start)"
+        for one, other in (dock.ports, dock.ports[::-1]):
+            mates.setdefault(one, []).append(other + (state if switchable(scene, dock) else ""))
     rows: list[tuple[Cell, ...]] = []
     for vessel_name, vessel in scene.vessels.items():
         for port_name, port in vessel.ports.items():
             name = f"{vessel_name}.{port_name}"
-            rows.append((name, port.position, port.direction, port.alignment, mates.get(name, "free")))
+            rows.append(
+                (name, port.position, port.direction, port.alignment, ", ".join(mates.get(name, ["free"])))
+            )
     head = ("port", "position [m]", "direction", "alignment", "docked to")
     return _table("Docking ports, in the axes of their vessels", head, rows) if rows else ""
+
+
+def _points(scene: Scene) -> str:
+    rows = [(name, scene.point(name).position) for name in scene.inputs.force]
+    caption = "Points where forces act, in the axes of their vessels"
+    return _table(caption, ("point", "position [m]"), rows) if rows else ""
+
+
+def _momentum(scene: Scene) -> str:
+    """Returns the equations of energy and momentum, HTML."""
+    own = f"<i>J ω</i> + {H}" if scene.inputs.motion else "<i>J ω</i>"
+    closed = f"({own})" if scene.inputs.motion else own
+    text = (
+        '<p class="equation">kinetic energy ½ <i>ω</i> · <i>J ω</i>, &#160;\n'
+        f"angular momentum <i>R</i>(<i>q</i>) {closed}</p>"
+    )
+    if scene.inputs.motion:
+        text += (
+            f"\n<p>{H} is the angular momentum of the parts that moving ports carry, relative to body axes: "
+            f"Σ <i>m</i><sub>j</sub> {RHO} {TIMES} {RHO}{PRIME} + <i>R</i><sub>j</sub> "
+            "<i>J</i><sub>j</sub> <i>R</i><sub>j</sub><sup>T</sup> <i>ω</i><sub>j</sub>, with the rate "
+            "<i>ω</i><sub>j</sub> of each relative to body axes.</p>"
+        )
+    return text
+
+
+def _changes(scene: Scene) -> str:
+    """Returns what changes of inputs do to the rotation, HTML."""
+    texts = [KEPT_BY[kind, kept] for kind, kept in scene.keeps.items()]
+    if len(texts) == 2:
+        texts.append("Where both change at one instant, masses come first.")
+    if scene.inputs.docked:
+        texts.append(DOCKING)
+    return "\n".join(f"<p>{text}</p>" for text in texts) or "<p>No input of this scene changes them.</p>"
 
 
 def _composite(whole: Composite) -> str:

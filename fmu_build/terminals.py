@@ -17,6 +17,7 @@ FILE_VERSION = {2: "3.0", 3: "3.0"}
 """The file's fmiVersion by that of the FMU: the version that defines the file."""
 
 POSE = ("position", "direction", "alignment")
+MOTION = ("velocity", "rate")
 
 ICON_EXTENT = 100.0
 """The FMU's icon fills the square from -100 to 100, the coordinates that FMI takes by default."""
@@ -48,18 +49,29 @@ class Terminal:
 
 
 def terminals(scene: Scene, entries: Sequence[Entry]) -> list[Terminal]:
-    """Returns the terminals of a scene: ports whose pose is an input, the torque, the attitude."""
-    found = [
-        Terminal(
-            port,
-            "port_pose",
-            "plug",
-            f"pose of docking port {port} in the axes of {port.partition('.')[0]}",
-            _members(entries, "input", *(f"{port}.{part}" for part in POSE)),
-            prefix=f"{port}.",
+    """Returns the terminals of a scene: ports whose pose is an input, docks, forces, torques, attitude."""
+
+    def inputs(owner: str, kind: str, description: str, *parts: str, name: str = "") -> Terminal:
+        members = _members(entries, "input", *(f"{owner}.{part}" for part in parts))
+        return Terminal(name or owner, kind, "plug", description, members, prefix=f"{owner}.")
+
+    found = []
+    for port in scene.inputs.pose:
+        place = f"of docking port {port} in the axes of {port.partition('.')[0]}"
+        if port in scene.inputs.motion:
+            found.append(inputs(port, "port_motion", f"pose and motion {place}", *POSE, *MOTION))
+        else:
+            found.append(inputs(port, "port_pose", f"pose {place}", *POSE))
+    for dock in scene.inputs.docked:
+        ports = " and ".join(scene.dock(dock).ports)
+        found.append(
+            inputs(dock, "dock", f"whether {ports} are docked, motion at contact", "docked", *MOTION)
         )
-        for port in scene.inputs.pose
-    ]
+    for point in scene.inputs.force:
+        found.append(inputs(point, "force", f"external force at {point}, axes of its vessel", "force"))
+    for vessel in scene.inputs.vessel_torque:
+        what = f"external torque on {vessel}, its axes"
+        found.append(inputs(vessel, "torque", what, "torque", name=f"{vessel}.torque"))
     torque = _members(entries, "input", "torque")
     attitude = _members(entries, "output", "attitude", "angular_velocity")
     found.append(
@@ -155,6 +167,24 @@ def _port_icon() -> list[Item]:
     ]
 
 
+def _dock_icon() -> list[Item]:
+    """Returns two docking ports, face to face."""
+    return [
+        Path(((26.0, 12.0), (26.0, 52.0)), stroke="#0072b2", width=6.0),
+        Path(((38.0, 12.0), (38.0, 52.0)), stroke="#d55e00", width=6.0),
+        *arrow((4.0, 32.0), (22.0, 32.0), "#222222", width=4.0, head=12.0),
+        *arrow((60.0, 32.0), (42.0, 32.0), "#222222", width=4.0, head=12.0),
+    ]
+
+
+def _force_icon() -> list[Item]:
+    """Returns an arrow from a point."""
+    return [
+        *arrow((12.0, 52.0), (54.0, 10.0), "#222222", width=5.0, head=18.0),
+        Path(regular_polygon((12.0, 52.0), 7.0, 16), fill="#d55e00", closed=True),
+    ]
+
+
 def _torque_icon() -> list[Item]:
     """Returns an arrow around an axis."""
     angles = [2.4 + 1.5 * pi * i / 24 for i in range(25)]
@@ -177,4 +207,11 @@ def _attitude_icon() -> list[Item]:
     ]
 
 
-ICONS = {"port_pose": _port_icon(), "torque": _torque_icon(), "attitude": _attitude_icon()}
+ICONS = {
+    "port_pose": _port_icon(),
+    "port_motion": _port_icon(),
+    "dock": _dock_icon(),
+    "force": _force_icon(),
+    "torque": _torque_icon(),
+    "attitude": _attitude_icon(),
+}

@@ -30,6 +30,14 @@ static double larger(double a, double b) {
     return a > b ? a : b;
 }
 
+#if STEPS == STEPS_BY_SERIES
+
+static double smaller(double a, double b) {
+    return a < b ? a : b;
+}
+
+#endif
+
 /* Rounding that an importer's own times may show, which are sums of its step sizes or multiples of one, counted from
    the start: half an ulp each of a product, a sum and the step added here, none of terms larger than these. */
 static double time_slack(const Dynamics *now, double h) {
@@ -60,6 +68,9 @@ typedef struct {
     double error;        /* rad, estimated, at the step's end */
     double next_size;    /* s, of the next sub-step, where the error controls it; 0: not known */
     int exponent;        /* power of a sub-step that its estimated error grows with, once next_size is known */
+#if STEPS == STEPS_BY_SERIES
+    double acceleration[3]; /* rad/s2, by the torque, once next_size is known */
+#endif
     bool composite_changed; /* since the last communication step */
     bool was_free;
 } Progress;
@@ -116,60 +127,38 @@ static Status sub_step(Instance *instance, Progress *progress) {
 
 #if STEPS == STEPS_BY_SERIES
 
-/* Of the series: 1 - ln(tolerance)/2 costs least; see supervessel/propagators/taylor.py. */
+/* Of the series: what costs least, see supervessel/propagators/taylor.py. */
 static int series_order(double tolerance) {
-    const int order = 2 * (int)ceil((1.0 - 0.5 * log(tolerance)) / 2.0);
+    const int order = 2 * (int)floor(2.5 - 0.29 * log(tolerance));
     return order < TAYLOR_LEAST_ORDER ? TAYLOR_LEAST_ORDER : order > TAYLOR_MOST_ORDER ? TAYLOR_MOST_ORDER : order;
 }
 
-/* Power of the step that the estimated error grows with. */
-static int error_exponent(const Instance *instance) {
-    return series_order(instance->now.tolerance) + 1;
-}
-
-/* From x by size [s] to next; error: estimates of the attitude's [rad] and the rate's [rad/s]. */
-static Status take_step(Instance *instance, int exponent, double size, double next[], double error[2]) {
-    double acceleration[3];
-    composite_refresh_axes(instance);
-    instance->arg[0] = &instance->now.values[REFERENCE_TORQUE];
-    instance->arg[1] = instance->now.c;
-    instance->res[0] = acceleration;
-    by_torque(instance->arg, instance->res, instance->iw, instance->w, 0);
-    taylor_step(instance_x(instance), acceleration, &instance->now.a[AXES_SERIES], size, exponent - 1, next,
-                error);
-    return STATUS_OK;
-}
-
-#else
-
-static int error_exponent(const Instance *instance) {
-    (void)instance;
-    return ERROR_EXPONENT;
-}
-
-static void call_step(Instance *instance, const double x[], double size, double next[], double error[2]) {
-    instance_set_arguments(instance);
-    instance->arg[0] = x;
-    instance->arg[3] = &size;
-    instance->res[0] = next;
-    instance->res[1] = error;
-    step(instance->arg, instance->res, instance->iw, instance->w, 0);
-}
-
-static Status take_step(Instance *instance, int exponent, double size, double next[], double error[2]) {
-    (void)exponent;
-    call_step(instance, instance_x(instance), size, next, error);
-#if FREE == FREE_BETWEEN_KICKS
-    double kicked[STATE_COUNT], drifted[STATE_COUNT], again[2];
-    memcpy(kicked, next, sizeof kicked);
-    const Status status = free_motion(instance, kicked, size, drifted);
-    if (status != STATUS_OK) return status;
-    call_step(instance, drifted, size, next, again);
 #endif
-    return STATUS_OK;
+
+/* Refuses a step that needs so many sub-steps. */
+static Status refuse_count(Instance *instance, const Progress *progress, double count) {
+    const double *x = instance_x(instance);
+    return instance_refuse(instance,
+                           "communicationStepSize = %.10g s needs %.6g sub-steps for tolerance = %.3g with "
+                           "angular_velocity = (%.10g, %.10g, %.10g) rad/s, %.10g s before its end; at most %g are "
+                           "taken",
+                           progress->h, count, instance->now.tolerance, x[4], x[5], x[6], progress->remaining,
+                           MOST_SUB_STEPS);
 }
 
-#endif
+/* Size of the next sub-step [s] by what is known before it. */
+static double planned_size(const Progress *progress) {
+    const double size = progress->next_size;
+    if (!(size < progress->remaining)) return progress->remaining;
+    return 2.0 * size > progress->remaining ? 0.5 * progress->remaining : size;
+}
+
+/* Goes on to next, by a sub-step of that size with an error that is estimated. */
+static void go_on(Instance *instance, Progress *progress, const double next[], double size, double error) {
+    progress->error += error;
+    memcpy(instance_x(instance), next, STATE_COUNT * sizeof(double));
+    progress->remaining = size < progress->remaining ? progress->remaining - size : 0.0;
+}
 
 /* Size of the first sub-step [s]. Below an angle that any tolerance allows nothing needs to be asked. */
 static double first_size(Instance *instance, const Progress *progress) {
@@ -187,30 +176,102 @@ static double first_size(Instance *instance, const Progress *progress) {
 #endif
 }
 
+#if STEPS == STEPS_BY_SERIES
+
+/* Angle [rad] for which an error of the rate is taken to turn the body on: errors of many sub-steps nearly cancel. */
+static const double TURNED_ON = 6.0;
+
+/* A sub-step may exceed by this factor the span that its series were made for. */
+static const double LONGEST_SHARE = 1.2;
+
+/* What of the error allowed a sub-step aims at: the estimate at another size than the series' is itself estimated. */
+static const double AIM = 0.8;
+
+static void begin_series(Instance *instance, Progress *progress) {
+    composite_refresh_axes(instance);
+    progress->exponent = series_order(instance->now.tolerance) + 1;
+    instance->arg[0] = &instance->now.values[REFERENCE_TORQUE];
+    instance->arg[1] = instance->now.c;
+    instance->res[0] = progress->acceleration;
+    by_torque(instance->arg, instance->res, instance->iw, instance->w, 0);
+    progress->next_size = first_size(instance, progress);
+}
+
+/* Takes one sub-step whose estimated error, as it shows at the communication step's end, stays within its share of the
+   tolerance by time, or within what rounding amounts to there. Series hold for any time: they are summed up at that
+   which the error allows, and no sub-step is taken again but for lack of finite numbers. */
+static Status sub_step(Instance *instance, Progress *progress) {
+    if (progress->next_size == 0.0) begin_series(instance, progress);
+    const double *x = instance_x(instance), *map = &instance->now.a[AXES_SERIES];
+    Series series;
+    series.order = progress->exponent - 1;
+    for (;;) {
+        const double size = planned_size(progress);
+        progress->taken += 1.0;
+        const double count = progress->taken - 1.0 + progress->remaining / size;
+        if (!(count <= MOST_SUB_STEPS)) return refuse_count(instance, progress, count);
+        taylor_series(x, progress->acceleration, map, size, &series);
+        const double speed = length_of(series.rates[0]) + length_of(series.rates[1]);
+        const double reach = larger(progress->remaining, speed > 0.0 ? 1.0 / speed : 0.0);
+        const double rounding = HALF_ULP * (1.0 + speed * reach);
+        const double allowed = larger(SAFETY * instance->now.tolerance * (size / progress->h), rounding);
+        const double found = series.error[0] + series.error[1] * smaller(reach, TURNED_ON / speed);
+        const double best = found > 0.0 ? pow(AIM * allowed / found, 1.0 / series.order) : 5.0;
+        double share = 1.0, next[STATE_COUNT];
+        if (!(found <= allowed)) share = best;
+        else if (2.0 * LONGEST_SHARE * size < progress->remaining) share = larger(1.0, smaller(best, LONGEST_SHARE));
+        taylor_sum(&series, x, map, share, next);
+        if (isfinite(found) && is_finite(next)) {
+            const double error = share == 1.0 ? found : AIM * allowed * share;
+            go_on(instance, progress, next, share * size, error + HALF_ULP * (1.0 + speed * size));
+            progress->next_size = size * smaller(best, 5.0);
+            return STATUS_OK;
+        }
+        progress->next_size = 0.2 * size;
+    }
+}
+
+#else
+
+static void call_step(Instance *instance, const double x[], double size, double next[], double error[2]) {
+    instance_set_arguments(instance);
+    instance->arg[0] = x;
+    instance->arg[3] = &size;
+    instance->res[0] = next;
+    instance->res[1] = error;
+    step(instance->arg, instance->res, instance->iw, instance->w, 0);
+}
+
+/* By size [s] to next; error: estimates of the attitude's [rad] and the rate's [rad/s]. */
+static Status take_step(Instance *instance, double size, double next[], double error[2]) {
+    call_step(instance, instance_x(instance), size, next, error);
+#if FREE == FREE_BETWEEN_KICKS
+    double kicked[STATE_COUNT], drifted[STATE_COUNT], again[2];
+    memcpy(kicked, next, sizeof kicked);
+    const Status status = free_motion(instance, kicked, size, drifted);
+    if (status != STATUS_OK) return status;
+    call_step(instance, drifted, size, next, again);
+#endif
+    return STATUS_OK;
+}
+
 /* Takes one sub-step whose estimated error, as it shows at the communication step's end, stays within its share of the
    tolerance by time, or within what rounding amounts to there; one that misses it is taken again, shorter. An error of
    the rate turns the body on for what remains, but counts no less than relative to the rate. */
 static Status sub_step(Instance *instance, Progress *progress) {
-    double *x = instance_x(instance), next[STATE_COUNT], error[2];
+    const double *x = instance_x(instance);
+    double next[STATE_COUNT], error[2];
     if (progress->next_size == 0.0) {
-        progress->exponent = error_exponent(instance);
+        progress->exponent = ERROR_EXPONENT;
         progress->next_size = first_size(instance, progress);
     }
     const double tolerance = instance->now.tolerance, power = 1.0 / (progress->exponent - 1.0);
     for (;;) {
-        double size = progress->next_size;
-        if (!(size < progress->remaining)) size = progress->remaining;
-        else if (2.0 * size > progress->remaining) size = 0.5 * progress->remaining;
+        const double size = planned_size(progress);
         progress->taken += 1.0;
         const double count = progress->taken - 1.0 + progress->remaining / size;
-        if (!(count <= MOST_SUB_STEPS))
-            return instance_refuse(instance,
-                                   "communicationStepSize = %.10g s needs %.6g sub-steps for tolerance = %.3g with "
-                                   "angular_velocity = (%.10g, %.10g, %.10g) rad/s, %.10g s before its end; at most %g "
-                                   "are taken",
-                                   progress->h, count, tolerance, x[4], x[5], x[6], progress->remaining,
-                                   MOST_SUB_STEPS);
-        const Status status = take_step(instance, progress->exponent, size, next, error);
+        if (!(count <= MOST_SUB_STEPS)) return refuse_count(instance, progress, count);
+        const Status status = take_step(instance, size, next, error);
         if (status != STATUS_OK) return status;
         const double speed = larger(length_of(x + 4), length_of(next + 4));
         const double reach = larger(progress->remaining, speed > 0.0 ? 1.0 / speed : 0.0);
@@ -219,15 +280,15 @@ static Status sub_step(Instance *instance, Progress *progress) {
         const double found = error[0] + error[1] * reach;
         const bool usable = is_finite(next) && isfinite(found);
         if (usable && found <= allowed) {
-            progress->error += found + HALF_ULP * (1.0 + speed * size);
-            memcpy(x, next, sizeof next);
-            progress->remaining = size < progress->remaining ? progress->remaining - size : 0.0;
+            go_on(instance, progress, next, size, found + HALF_ULP * (1.0 + speed * size));
             if (progress->remaining > 0.0) progress->next_size = size * fmin(5.0, 0.9 * pow(allowed / found, power));
             return STATUS_OK;
         }
         progress->next_size = size * (usable ? larger(0.2, 0.9 * pow(allowed / found, power)) : 0.2);
     }
 }
+
+#endif
 
 #endif
 
@@ -324,7 +385,7 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
     Status status = check_times(instance, time, h);
     if (status == STATUS_OK) status = composite_refresh(instance);
     if (status != STATUS_OK) return status;
-    Progress progress = {h, h, 0.0, 0.0, 0.0, 0, false, false};
+    Progress progress = {.h = h, .remaining = h};
     progress.composite_changed = memcmp(now->p, now->stepped_p, sizeof now->p) != 0;
     double start[STATE_COUNT], end = time + h;
     const double start_time = now->values[REFERENCE_TIME], start_error = now->error_estimate;

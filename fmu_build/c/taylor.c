@@ -6,106 +6,148 @@
 
 #if STEPS == STEPS_BY_SERIES
 
-/* A coefficient (a, b, c, d) of the turn, as the products with (0, x, y, z) take it. */
-typedef struct {
-    double by_x[4], by_y[4], by_z[4];
-} Turn;
+#if PRODUCT_COUNT == 0
+enum { WIDTH = 7 };
+#else
+enum { WIDTH = 10 };
+#endif
+
+/* What the products take of a coefficient: seven of the turn or the rates, see _turn in taylor.py, then the rates. */
+typedef double Row[WIDTH];
 
 static double remainder_of(double before, double after) {
     return after / sqrt(before > 0.0 ? before : 1.0);
 }
 
+void add_products(const Row *one, const Row *other, int count, double sums[WIDTH]);
+
+/* sums: of products, element by element, of rows from `one` on and rows from `other` back. Not static: a compiler that
+   mixes this loop with what follows no longer takes two elements at a time. */
+void add_products(const Row *one, const Row *other, int count, double sums[WIDTH]) {
+    double s[WIDTH] = {0.0};
+    for (int j = 0; j < count; j++)
+        for (int i = 0; i < WIDTH; i++) s[i] += one[j][i] * other[-j][i];
+    for (int i = 0; i < WIDTH; i++) sums[i] = s[i];
+}
+
+#if PRODUCT_COUNT > 3 /* the map has axes of its own */
+
+/* Between body axes and those of the map. */
+static void from_body(const double map[], const double v[3], double out[3]) {
+    const double *R = map + 3;
+    for (int i = 0; i < 3; i++) out[i] = R[3 * i] * v[0] + R[3 * i + 1] * v[1] + R[3 * i + 2] * v[2];
+}
+
+static void to_body(const double map[], const double v[3], double out[3]) {
+    const double *R = map + 3;
+    for (int i = 0; i < 3; i++) out[i] = R[i] * v[0] + R[3 + i] * v[1] + R[6 + i] * v[2];
+}
+
+#else
+
+static void from_body(const double map[], const double v[3], double out[3]) {
+    (void)map;
+    for (int i = 0; i < 3; i++) out[i] = v[i];
+}
+
+static void to_body(const double map[], const double v[3], double out[3]) {
+    from_body(map, v, out);
+}
+
+#endif
+
+/* Fills the rows of one coefficient. */
+static void spread(const double turn[4], const double rate[3], double step, double one[WIDTH], double other[WIDTH]) {
+    const double even = turn[0] + turn[2], odd = turn[1] + turn[3], p = turn[0] - turn[2], q = turn[1] - turn[3];
+    one[0] = even + odd;
+    one[1] = even - odd;
+    one[2] = p + q;
+    one[3] = p - q;
+    one[4] = turn[3];
+    one[5] = turn[1];
+    one[6] = turn[2];
+    const double eighth = 0.125 * step, y = eighth * rate[1];
+    const double plus = eighth * rate[0] + eighth * rate[2], minus = eighth * rate[0] - eighth * rate[2];
+    other[0] = plus + y;
+    other[1] = y - plus;
+    other[2] = minus - y;
+    other[3] = -y - minus;
+    other[4] = -step * rate[1];
+    other[5] = -step * rate[2];
+    other[6] = -step * rate[0];
 #if PRODUCT_COUNT > 0
-
-/* Coefficient k of the product of two rates; even and odd terms have a sum of their own. */
-static double mixed_product(double (*rates)[3], int k, int first, int second) {
-    double even = 0.0, odd = 0.0;
-    int j = 0;
-    for (; j < k; j += 2) {
-        even += rates[j][first] * rates[k - j][second];
-        odd += rates[j + 1][first] * rates[k - j - 1][second];
-    }
-    if (j == k) even += rates[j][first] * rates[0][second];
-    return even + odd;
+    one[7] = other[9] = rate[1];
+    one[8] = other[7] = rate[2];
+    one[9] = other[8] = rate[0];
+#endif
 }
 
-#endif
-
-#if PRODUCT_COUNT > 3
-
-/* Coefficient k of the square of a rate; its terms are added once and doubled. */
-static double square_product(double (*rates)[3], int k, int i) {
-    const int middle = (k + 1) / 2;
-    double even = 0.0, odd = 0.0;
-    int j = 0;
-    for (; j + 1 < middle; j += 2) {
-        even += rates[j][i] * rates[k - j][i];
-        odd += rates[j + 1][i] * rates[k - j - 1][i];
+static void estimate(Series *series) {
+    double before[2] = {0.0, 0.0}, after[2] = {0.0, 0.0};
+    for (int k = series->order - 3; k <= series->order; k++) {
+        double *squares = k < series->order - 1 ? before : after;
+        for (int i = 0; i < 4; i++) squares[0] += series->turn[k][i] * series->turn[k][i];
+        for (int i = 0; i < 3; i++) squares[1] += series->rates[k][i] * series->rates[k][i];
     }
-    if (j < middle) even += rates[j][i] * rates[k - j][i];
-    const double twice = 2.0 * (even + odd);
-    return k % 2 ? twice : twice + rates[middle][i] * rates[middle][i];
+    series->error[0] = 2.0 * remainder_of(before[0], after[0]);
+    series->error[1] = remainder_of(before[1], after[1]);
 }
 
+void taylor_series(const double x[7], const double acceleration[3], const double map[], double step, Series *series) {
+    Row ones[TAYLOR_MOST_ORDER], others[TAYLOR_MOST_ORDER];
+    double w[3], push[3];
+    from_body(map, x + 4, w);
+    from_body(map, acceleration, push);
+    const double half = 0.5 * step, X = half * w[0], Y = half * w[1], Z = half * w[2];
+    const int order = series->order;
+    double(*turn)[4] = series->turn, (*rates)[3] = series->rates;
+    for (int i = 0; i < 3; i++) rates[0][i] = w[i];
+    turn[0][0] = turn[0][1] = turn[0][2] = turn[0][3] = 0.0;
+    turn[1][0] = 0.0;
+    turn[1][1] = X;
+    turn[1][2] = Y;
+    turn[1][3] = Z;
+    for (int i = 0; i < 3; i++) rates[1][i] = step * push[i];
+#if PRODUCT_COUNT > 0
+    const double pull[3] = {step * map[0], step * map[1], step * map[2]};
+    for (int i = 0; i < 3; i++) rates[1][i] = pull[i] * (w[(i + 1) % 3] * w[(i + 2) % 3]) + rates[1][i];
 #endif
-
-/* change: coefficient k of step times the acceleration, from the coefficients 0 .. k of the rates. */
-static void gyroscopic(double (*rates)[3], int k, const double pull[], double change[3]) {
-#if PRODUCT_COUNT == 0
-    (void)rates, (void)k, (void)pull;
-    change[0] = change[1] = change[2] = 0.0;
+    for (int k = 1; k < order; k++) {
+        const double *p = turn[k], *v = rates[k], scale = 1.0 / (k + 1);
+        double s[WIDTH];
+        add_products(ones + 1, others + (k - 1), k - 1, s);
+        const double even = s[0] + s[2], odd = s[1] + s[3], f = s[0] - s[2], g = s[1] - s[3];
+        double *next = turn[k + 1], *rate = rates[k + 1];
+        next[0] = scale * (-(even + odd) - ((p[1] * X + p[2] * Y) + p[3] * Z));
+        next[1] = scale * ((((even - odd) + s[4]) + half * v[0]) + ((p[0] * X + p[2] * Z) - p[3] * Y));
+        next[2] = scale * ((((f + g) + s[5]) + half * v[1]) + ((p[0] * Y + p[3] * X) - p[1] * Z));
+        next[3] = scale * ((((f - g) + s[6]) + half * v[2]) + ((p[0] * Z + p[1] * Y) - p[2] * X));
+#if PRODUCT_COUNT > 0
+        rate[0] = (scale * pull[0]) * (s[7] + (w[1] * v[2] + v[1] * w[2]));
+        rate[1] = (scale * pull[1]) * (s[8] + (w[2] * v[0] + v[2] * w[0]));
+        rate[2] = (scale * pull[2]) * (s[9] + (w[0] * v[1] + v[0] * w[1]));
 #else
-    double products[PRODUCT_COUNT];
-    for (int i = 0; i < 3; i++) products[i] = mixed_product(rates, k, (i + 1) % 3, (i + 2) % 3);
-#if PRODUCT_COUNT == 3 /* of principal axes: the map is diagonal */
-    for (int i = 0; i < 3; i++) change[i] = pull[4 * i] * products[i];
-#else
-    for (int i = 0; i < 3; i++) products[3 + i] = square_product(rates, k, i);
-    for (int i = 0; i < 3; i++) {
-        change[i] = pull[i] * products[0];
-        for (int n = 1; n < PRODUCT_COUNT; n++) change[i] += pull[i + 3 * n] * products[n];
+        rate[0] = rate[1] = rate[2] = 0.0;
+#endif
+        if (k + 1 < order) spread(p, v, step, ones[k], others[k]);
     }
-#endif
-#endif
+    estimate(series);
 }
 
-void taylor_step(const double x[7], const double acceleration[3], const double map[], double step, int order,
-                 double next[7], double error[2]) {
-    Turn turns[TAYLOR_MOST_ORDER];
-    double halves[TAYLOR_MOST_ORDER][3], rates[TAYLOR_MOST_ORDER + 1][3], turn[TAYLOR_MOST_ORDER][4];
-    double pull[3 * PRODUCT_COUNT + 1];
-    for (int i = 0; i < 3 * PRODUCT_COUNT; i++) pull[i] = step * map[i];
-    for (int i = 0; i < 3; i++) rates[0][i] = x[4 + i];
-    for (int k = 0; k < order; k++) {
-        const double scale = 1.0 / (k + 1);
-        double by_x[4] = {0.0, 0.0, 0.0, 0.0}, by_y[4] = {0.0, 0.0, 0.0, 0.0}, by_z[4] = {0.0, 0.0, 0.0, 0.0};
-        for (int j = 0; j < k; j++) {
-            const Turn *t = &turns[j];
-            const double *half = halves[k - 1 - j];
-            for (int i = 0; i < 4; i++) {
-                by_x[i] += t->by_x[i] * half[0];
-                by_y[i] += t->by_y[i] * half[1];
-                by_z[i] += t->by_z[i] * half[2];
-            }
-        }
-        double change[3];
-        gyroscopic(rates, k, pull, change);
-        for (int i = 0; i < 3; i++) {
-            halves[k][i] = 0.5 * step * rates[k][i];
-            if (k == 0) change[i] += step * acceleration[i];
-            rates[k + 1][i] = scale * change[i];
-        }
-        const double last[4] = {0.0, halves[k][0], halves[k][1], halves[k][2]};
-        for (int i = 0; i < 4; i++) turn[k][i] = scale * (((by_x[i] + by_y[i]) + by_z[i]) + last[i]);
-        const double a = turn[k][0], b = turn[k][1], c = turn[k][2], d = turn[k][3];
-        turns[k] = (Turn){{-b, a, d, -c}, {-c, -d, a, b}, {-d, c, -b, a}};
+void taylor_sum(const Series *series, const double x[7], const double map[], double share, double next[7]) {
+    double turned[2][4] = {{0.0}}, gained[2][3] = {{0.0}}, axis[3], gain[3];
+    const double square = share * share;
+    for (int k = series->order; k > 0; k -= 2) { /* the smallest first */
+        for (int i = 0; i < 4; i++) turned[0][i] = turned[0][i] * square + series->turn[k][i];
+        for (int i = 0; i < 4; i++) turned[1][i] = turned[1][i] * square + series->turn[k - 1][i];
+        for (int i = 0; i < 3; i++) gained[0][i] = gained[0][i] * square + series->rates[k][i];
+        for (int i = 0; i < 3; i++) gained[1][i] = gained[1][i] * square + series->rates[k - 1][i];
     }
-    double turned[4] = {0.0, 0.0, 0.0, 0.0}, gained[3] = {0.0, 0.0, 0.0};
-    for (int k = order - 1; k >= 0; k--) { /* the smallest first */
-        for (int i = 0; i < 4; i++) turned[i] += turn[k][i];
-        for (int i = 0; i < 3; i++) gained[i] += rates[k + 1][i];
-    }
-    const double a = turned[0], b = turned[1], c = turned[2], d = turned[3];
+    for (int i = 0; i < 4; i++) turned[0][i] = turned[0][i] * square + turned[1][i] * share;
+    for (int i = 0; i < 3; i++) gained[0][i] = gained[0][i] * square + gained[1][i] * share;
+    to_body(map, turned[0] + 1, axis);
+    to_body(map, gained[0], gain);
+    const double a = turned[0][0], b = axis[0], c = axis[1], d = axis[2];
     const double q[4] = {
         x[0] + (x[0] * a - (x[1] * b + x[2] * c + x[3] * d)),
         x[1] + (x[0] * b + x[1] * a + (x[2] * d - x[3] * c)),
@@ -114,15 +156,7 @@ void taylor_step(const double x[7], const double acceleration[3], const double m
     };
     const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     for (int i = 0; i < 4; i++) next[i] = q[i] / length;
-    for (int i = 0; i < 3; i++) next[4 + i] = x[4 + i] + gained[i];
-    double before[2] = {0.0, 0.0}, after[2] = {0.0, 0.0};
-    for (int k = order - 4; k < order; k++) {
-        double *squares = k < order - 2 ? before : after;
-        for (int i = 0; i < 4; i++) squares[0] += turn[k][i] * turn[k][i];
-        for (int i = 0; i < 3; i++) squares[1] += rates[k + 1][i] * rates[k + 1][i];
-    }
-    error[0] = 2.0 * remainder_of(before[0], after[0]);
-    error[1] = remainder_of(before[1], after[1]);
+    for (int i = 0; i < 3; i++) next[4 + i] = x[4 + i] + gain[i];
 }
 
 #else

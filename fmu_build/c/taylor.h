@@ -1,15 +1,28 @@
-/* A Taylor step by loops: what supervessel/propagators/taylor.py unrolls for the twin, operation by operation. Loops, because the unrolled code of order 12 and more is half as fast: it outgrows the
-   instruction cache. */
+/* Taylor series by loops: what supervessel/propagators/taylor.py unrolls for the twin, operation by operation. Loops,
+   because the unrolled code outgrows the instruction cache. */
 #ifndef TAYLOR_H
 #define TAYLOR_H
 
-enum { TAYLOR_LEAST_ORDER = 8, TAYLOR_MOST_ORDER = 16 };
+enum { TAYLOR_LEAST_ORDER = 6, TAYLOR_MOST_ORDER = 20 };
 
-/* From x (attitude, angular velocity) by step [s] to next.
-   acceleration : by the torque [rad/s2]
-   map          : of the products of two rates to the acceleration without torque, column by column
-   error        : estimates, attitude [rad] and angular velocity [rad/s]; they grow with step^(order + 1) */
-void taylor_step(const double x[7], const double acceleration[3], const double map[], double step, int order,
-                 double next[7], double error[2]);
+/* The coefficients of s^0, s^1, and so on, s being (time since x)/step, in the axes of the map.
+   turn  : of the turn since x, a quaternion, without its 1
+   rates : of the angular velocity [rad/s]
+   error : estimate of what the series leave out at s = 1: attitude [rad], angular velocity [rad/s]; like
+           s^(order + 1) */
+typedef struct {
+    double turn[TAYLOR_MOST_ORDER + 1][4], rates[TAYLOR_MOST_ORDER + 1][3], error[2];
+    int order;
+} Series;
+
+/* Finds the series, their order being set, from x (attitude, angular velocity).
+   acceleration : by the torque [rad/s2], body axes
+   map          : without torque the accelerations are its first three numbers times products of two rates, in the
+                  body axes; or in those, column by column, that follow
+   step         : [s] */
+void taylor_series(const double x[7], const double acceleration[3], const double map[], double step, Series *series);
+
+/* Sums the series up, at s = share, to the state next. */
+void taylor_sum(const Series *series, const double x[7], const double map[], double share, double next[7]);
 
 #endif

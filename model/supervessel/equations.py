@@ -26,7 +26,7 @@ from supervessel.propagators.bound import fastest_square
 from supervessel.propagators.exact import free_functions
 from supervessel.propagators.method import Motion
 from supervessel.quantities import EPSILON
-from supervessel.rotation import LAWS, turned_products
+from supervessel.rotation import LAWS, principal_products
 from supervessel.scene import Scene, changes_rate, keeps_momentum
 from supervessel.variables import input_variables, output_variables, state_variables
 from supervessel.vessels import (
@@ -68,7 +68,8 @@ class Equations:
     composite    : p -> c
     axes         : c -> a; "principal" of the composite for outputs, "free" of what the law turns freely:
                    three moments each, ascending, and axes: quaternion (4,) or matrix, column by column, (9,);
-                   "series", the law's map of the products of two rates, (3, n) column by column
+                   "series", what takes the products of two rates to the acceleration in principal axes, (3,),
+                   then, unless these are the body's, the axes
     ode          : x, u, c -> rate of x
     outputs      : x, u, c, a, e -> the outputs y, in the scene's order; e is the last step's error estimate
     fastest_square : x, u, c -> square [rad2/s2] of the fastest rate while turning by the scene's angle
@@ -279,7 +280,8 @@ def _axes(scene: Scene, plan: Plan, inertia: ca.SX, products: ca.SX) -> tuple[di
     if plan.free != "never":
         parts["free"] = ca.vertcat(moments, ca.vec(axes))
     if in_series:
-        parts["series"] = ca.vec(turned_products(moments, axes) if mapped else products)
+        own = ca.vertcat(principal_products(moments), ca.vec(axes)) if mapped else ca.diag(products[:, :3])
+        parts["series"] = own if products.numel() else ca.SX(0, 1)
     slices, end = {}, 0
     for name, part in parts.items():
         slices[name] = slice(end, end := end + part.numel())

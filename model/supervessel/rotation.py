@@ -136,25 +136,15 @@ def _tensor_products(numbers: ca.SX) -> ca.SX:
     return inverse @ ca.vertcat(*(ca.horzcat(*row) for row in rows))
 
 
-def turned_products(moments: ca.SX, axes: ca.SX) -> ca.SX:
-    """Returns the map of MIXED_PRODUCTS + SQUARES to the acceleration without torque, (3, 6), body axes.
+def principal_products(moments: ca.SX) -> ca.SX:
+    """Returns (J_j - J_k)/J_i, (3,), which take MIXED_PRODUCTS to the acceleration without torque.
 
-    moments : principal, (3,) [kg m2]
-    axes    : R_body_principal, (3, 3)
-    The same as that of the law "tensor". There the inverse of the tensor enlarges rounding by its condition
-    number, with moments 1e12 apart to a steady spin about the lightest axis; here nothing is inverted.
+    moments : principal, (3,) [kg m2]; rates and acceleration in their axes
+    The same as the map of the law "tensor" in body axes. There the inverse of the tensor enlarges rounding by
+    its condition number, with moments 1e12 apart to a steady spin about the lightest axis; here nothing is
+    inverted.
     """
-    columns = []
-    for k, m in MIXED_PRODUCTS + SQUARES:
-        column = ca.SX.zeros(3)
-        for i in range(3):
-            j, n = (i + 1) % 3, (i + 2) % 3
-            weight = axes[k, j] * axes[m, n]
-            if k != m:
-                weight += axes[m, j] * axes[k, n]
-            column += axes[:, i] * ((moments[j] - moments[n]) / moments[i] * weight)
-        columns.append(column)
-    return ca.horzcat(*columns)
+    return ca.vertcat(*((moments[i - 2] - moments[i - 1]) / moments[i] for i in range(3)))
 
 
 LAWS: dict[Law, RotationLaw] = {

@@ -22,9 +22,6 @@ PROPAGATORS: dict[str, Propagator] = {
 }
 """The methods; "auto" is a plan made of them."""
 
-TIGHTEST_OF_DOP853 = 1e-6
-"""Tolerance below which "auto" takes Taylor steps: they then cost less (`make bench`)."""
-
 
 CHANGING = ("mass", "pmi", "pose", "docked", "torque", "force", "vessel_torque")
 """Inputs by which a motion may be other than free; Taylor steps know no spin of moving parts."""
@@ -52,9 +49,7 @@ def plan_of(scene: "Scene") -> Plan:
     inputs = scene.inputs
     if not any(getattr(inputs, key) for key in CHANGING):
         return Plan(None, "always")
-    by_runge_kutta = inputs.motion or scene.rotation.tolerance >= TIGHTEST_OF_DOP853
-    method = "dop853" if by_runge_kutta else "taylor"
-    return Plan(PROPAGATORS[method], "while free")
+    return Plan(PROPAGATORS["dop853" if inputs.motion else "taylor"], "while free")
 
 
 def description(scene: "Scene") -> str:

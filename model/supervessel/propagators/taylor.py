@@ -1,7 +1,8 @@
 """Taylor series of attitude and angular velocity, unrolled to a fixed order."""
 
 from collections.abc import Sequence
-from math import ceil, log
+from math import floor, log
+from operator import mul
 
 import casadi as ca
 
@@ -9,20 +10,20 @@ from supervessel.attitude import unit
 from supervessel.propagators.method import Motion, Propagator, Step
 from supervessel.rotation import RotationLaw
 
-LEAST_ORDER, MOST_ORDER = 8, 16
+LEAST_ORDER, MOST_ORDER = 6, 20
 
 Coefficients = Sequence[Sequence[ca.SX]]
 """Of s^0, s^1, and so on, the components of each."""
 
 
 def taylor_order(tolerance: float) -> int:
-    """Returns the order that meets a tolerance [rad] for about the least work: even, from 8 to 16.
+    """Returns the order that meets a tolerance [rad] for about the least work: even, from 6 to 20.
 
-    Work grows with the square of the order P, the step shrinks with tolerance^(1/P): the two together are
-    least near P = 1 - ln(tolerance)/2. Above 16 nothing is gained before rounding sets in (measured).
-    Source: [JZ].
+    Work that grows with the square of the order P, and steps that shrink with tolerance^(1/P), together are
+    least near P = 1 - ln(tolerance)/2 ([JZ]). What each coefficient costs besides puts it higher: measured
+    (`make bench`), to the nearest even number, P = 4 - 0.58 ln(tolerance).
     """
-    order = 2 * ceil((1.0 - 0.5 * log(tolerance)) / 2.0)
+    order = 2 * floor(2.5 - 0.29 * log(tolerance))
     return min(max(order, LEAST_ORDER), MOST_ORDER)
 
 
@@ -42,59 +43,80 @@ def taylor_step(  # noqa: PLR0913, PLR0917
     turn since the start p, a quaternion with p_0 = 1,
     (k + 1) w_k+1 = step (acceleration by the coefficients k of the products, and where k = 0 by torque),
     (k + 1) p_k+1 = sum over j of p_j (0, step/2 w_k-j).
+    The terms that hold a coefficient 0, or k, stand by themselves: nothing else waits for the latest ones.
     Source: [JZ].
     """
     half = 0.5 * step
     push = step * law.acceleration(numbers, ca.SX.zeros(3), torque)
     pull = step * law.gyroscopic(numbers)
     rates = [ca.vertsplit(state[4:])]
-    halves = [[half * rate for rate in rates[0]]]
+    start = [half * rate for rate in rates[0]]
     turns: list[list[ca.SX]] = []  # from p_1 on
     for k in range(order):
-        products = ca.vertcat(*(_product(rates, i, j) for i, j in law.products))
-        change = pull @ products if law.products else ca.SX.zeros(3)
-        change = change + push if k == 0 else change
         scale = 1.0 / (k + 1)
-        turns.append([scale * x for x in _turn(turns, halves)])
-        rates.append(ca.vertsplit(scale * ca.densify(change)))
-        halves.append([half * rate for rate in rates[-1]])
+        products = ca.vertcat(*(_product(rates, i, j) for i, j in law.products))
+        change = (scale * pull) @ products if law.products else ca.SX.zeros(3)
+        turns.append([scale * x for x in _turn(turns, rates, step)] if k else [ca.SX(0), *start])
+        rates.append(ca.vertsplit(ca.densify(change + push if k == 0 else change)))
     error = ca.vertcat(2.0 * _remainder(turns[-4:]), _remainder(rates[-4:]))
     attitude = state[:4] + _times(state[:4], _sum(turns))
     return ca.vertcat(unit(attitude), state[4:] + _sum(rates[1:])), error
 
 
-def _turn(turns: Coefficients, halves: Coefficients) -> list[ca.SX]:
-    """Returns the sum over j of p_j (0, a_k-j), (4,), from p_1 .. p_k and a_0 .. a_k.
+def _turn(turns: Coefficients, rates: Coefficients, step: ca.SX) -> list[ca.SX]:
+    """Returns the sum over j of p_j (0, step/2 w_k-j), (4,), from p_1 .. p_k and w_0 .. w_k.
 
-    Each of the three rates has a sum of its own, which a loop can run side by side.
+    For 0 < j < k a product takes seven multiplications: four of signed sums, whose signed sums are those of a
+    product without minus signs, and three to set the signs right. Source: [HL].
     """
-    zero = ca.SX(0)
-    by_x, by_y, by_z = [zero] * 4, [zero] * 4, [zero] * 4
-    *earlier, (p, q, r) = halves
-    for (a, b, c, d), (x, y, z) in zip(turns, reversed(earlier), strict=True):
-        by_x = [s + t for s, t in zip(by_x, (-b * x, a * x, d * x, -c * x), strict=True)]
-        by_y = [s + t for s, t in zip(by_y, (-c * y, -d * y, a * y, b * y), strict=True)]
-        by_z = [s + t for s, t in zip(by_z, (-d * z, c * z, -b * z, a * z), strict=True)]
-    return [(x + y) + z + w for x, y, z, w in zip(by_x, by_y, by_z, (zero, p, q, r), strict=True)]
+    half = 0.5 * step
+    *middle, (a, b, c, d) = turns
+    (x, y, z), *later = rates
+    latest = later.pop()
+    sums = [ca.SX(0)] * 7
+    for turn, rate in zip(middle, reversed(later), strict=True):
+        terms = map(mul, _spread_turn(turn), _spread_rate(rate, step))
+        sums = [s + term for s, term in zip(sums, terms, strict=True)]
+    f, g, h, i, *signs = sums
+    even, odd, p, q = f + h, g + i, f - h, g - i
+    x, y, z = half * x, half * y, half * z
+    return [
+        -(even + odd) - ((b * x + c * y) + d * z),
+        (((even - odd) + signs[0]) + half * latest[0]) + ((a * x + c * z) - d * y),
+        (((p + q) + signs[1]) + half * latest[1]) + ((a * y + d * x) - b * z),
+        (((p - q) + signs[2]) + half * latest[2]) + ((a * z + b * y) - c * x),
+    ]
+
+
+def _spread_turn(turn: Sequence[ca.SX]) -> list[ca.SX]:
+    """Returns what the seven multiplications take of a coefficient of the turn."""
+    a, b, c, d = turn
+    even, odd, p, q = a + c, b + d, a - c, b - d
+    return [even + odd, even - odd, p + q, p - q, d, b, c]
+
+
+def _spread_rate(rate: Sequence[ca.SX], step: ca.SX) -> list[ca.SX]:
+    """Returns what they take of one of the rates."""
+    eighth = 0.125 * step
+    x, y, z = (eighth * w for w in rate)
+    plus, minus = x + z, x - z
+    return [plus + y, y - plus, minus - y, -y - minus, *(-step * w for w in (rate[1], rate[2], rate[0]))]
 
 
 def _product(rates: Coefficients, first: int, second: int) -> ca.SX:
-    """Returns coefficient k of the product of two rates, from their coefficients 0 .. k.
-
-    Even and odd terms have a sum of their own; a square's terms are added once and doubled.
-    """
-    k = len(rates) - 1
-    terms = [rates[j][first] * rates[k - j][second] for j in range(k + 1)]
-    if first != second:
-        return sum(terms[::2], ca.SX(0)) + sum(terms[1::2], ca.SX(0))
-    middle = (k + 1) // 2
-    twice = 2.0 * (sum(terms[:middle:2], ca.SX(0)) + sum(terms[1:middle:2], ca.SX(0)))
-    return twice if k % 2 else twice + terms[middle]
+    """Returns coefficient k of the product of two rates, from their coefficients 0 .. k."""
+    one, other = ([rate[i] for rate in rates] for i in (first, second))
+    if len(rates) == 1:
+        return one[0] * other[0]
+    middle = sum(map(mul, one[1:-1], reversed(other[1:-1])), ca.SX(0))
+    return middle + (one[0] * other[-1] + one[-1] * other[0])
 
 
 def _sum(terms: Coefficients) -> ca.SX:
-    """Returns the sum of a series, from its last coefficient on: the smallest are added first."""
-    return sum((ca.vertcat(*term) for term in reversed(terms)), ca.SX.zeros(len(terms[0])))
+    """Returns the sum of a series of s^1, s^2, and so on; its even and odd powers, the smallest terms first."""
+    columns = [ca.vertcat(*term) for term in terms]
+    odd, even = (sum(reversed(columns[i::2]), ca.SX.zeros(len(terms[0]))) for i in (0, 1))
+    return even + odd
 
 
 def _times(one: ca.SX, other: ca.SX) -> ca.SX:
@@ -131,7 +153,7 @@ PROPAGATOR = Propagator(
     build,
     "series",
     "never",
-    "Taylor series of attitude and angular velocity ([JZ]), of an order from 8 to 16 that suits the "
+    "Taylor series of attitude and angular velocity ([JZ]), of an order from 6 to 20 that suits the "
     "tolerance. A communication step is divided so that the estimated error of the attitude at its end stays "
     "below <code>tolerance</code>.",
     safety=2.5,
