@@ -88,6 +88,7 @@ def scene_header(scene: Scene, model: Equations, entries: Sequence[Entry]) -> st
         "COMPOSITE_MARGINS": where["margins"].start,
         "COMPOSITE_LAW": where["law"].start,
         "LAW_TURNS": int(scene.rotation.law != "none"),
+        "TRIANGLE_JUDGED": int(scene.convention == "rigid_body"),
         "WORK_ARG": arg,
         "WORK_RES": res,
         "WORK_INT": iw,

@@ -152,6 +152,8 @@ def _facts(scene: Scene, fmi: int) -> str:
         ("tolerance", rotation.tolerance),
         ("max_angle_step [rad]", rotation.max_angle_step),
     ]
+    if scene.convention == "orbiter":
+        rows.append(("convention", "orbiter: of the composite's tensor only the diagonal is kept"))
     if experiment is not None:
         rows += [("default duration [s]", experiment.duration), ("default step [s]", experiment.step)]
     return _table("", (), rows)

@@ -47,7 +47,7 @@ static Status check_pmi(Instance *instance, const Variable *variable, const doub
         return instance_refuse(instance, "%.*s = (%.10g, %.10g, %.10g) m2: must be >= 0", group_length(variable),
                                variable->name, k[0], k[1], k[2]);
     const double excess = large - (small + middle);
-    if (excess <= TRIANGLE_SLACK * large) return STATUS_OK;
+    if (!TRIANGLE_JUDGED || excess <= TRIANGLE_SLACK * large) return STATUS_OK;
     char text[3][NUMBER_SIZE];
     return instance_refuse(instance,
                            "%.*s = (%.10g, %.10g, %.10g) m2: %s exceeds %s + %s by %.6g; no rigid body has these "

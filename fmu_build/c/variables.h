@@ -14,7 +14,7 @@ typedef enum { ROLE_TIME, ROLE_INPUT, ROLE_PARAMETER, ROLE_OUTPUT, ROLE_STATE, R
 typedef enum {
     CHECK_NONE,
     CHECK_MASS,   /* >= 0 */
-    CHECK_PMI,    /* three moments >= 0 that obey the triangle inequality */
+    CHECK_PMI,    /* three moments >= 0; unless the scene says otherwise they obey the triangle inequality */
     CHECK_PORT    /* direction[3] and alignment[3]: lengths > 0, not parallel */
 } Check;
 

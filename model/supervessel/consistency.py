@@ -9,17 +9,19 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from supervessel.problems import quantity
-from supervessel.quantities import Vector, is_number, vector_length
+from supervessel.quantities import Vector, is_number, triangle_problem, vector_length
 from supervessel.scene import PARALLEL_LIMIT, PERPENDICULAR_LIMIT, VARIABLE_UNITS, tables
 
 
 def consistency_problems(raw: Mapping[str, Any]) -> list[str]:
     """Returns what is wrong between the values of a scene, given as the raw tables of its file."""
     problems: list[str] = []
+    rigid = raw.get("convention") != "orbiter"
     for name, vessel in tables(raw, "vessels"):
         problems += _moments(f"vessels.{name}", vessel)
+        problems += _rigid_moments(f"vessels.{name}", vessel) if rigid else _no_tensor(name, vessel)
         for port, table in tables(vessel, "ports"):
-            problems += _directions(f"vessels.{name}.ports.{port}", table)
+            problems += direction_problems(f"vessels.{name}.ports.{port}", table)
     return [*problems, *_experiment(raw), *_ranges(raw), *_total_mass(raw), *_propagator(raw), *_changes(raw)]
 
 
@@ -32,7 +34,22 @@ def _moments(place: str, vessel: Mapping[str, Any]) -> Iterator[str]:
         yield f"{place}.mass = 0.0 kg: must be > 0 for a vessel given by inertia; inertia/mass is kept"
 
 
-def _directions(place: str, port: Mapping[str, Any]) -> Iterator[str]:
+def _rigid_moments(place: str, vessel: Mapping[str, Any]) -> Iterator[str]:
+    pmi = vessel.get("pmi")
+    if not (isinstance(pmi, list | tuple) and len(pmi) == 3 and all(map(is_number, pmi)) and min(pmi) >= 0):
+        return
+    x, y, z = map(float, pmi)
+    problem = triangle_problem((x, y, z))
+    if problem:
+        yield f"{place}.pmi = {quantity((x, y, z), 'm2')}: {problem}"
+
+
+def _no_tensor(name: str, vessel: Mapping[str, Any]) -> Iterator[str]:
+    if "inertia" in vessel:
+        yield f'vessels.{name}.inertia: convention = "orbiter" knows no products of inertia; give pmi [m2]'
+
+
+def direction_problems(place: str, port: Mapping[str, Any]) -> Iterator[str]:
     """Yields why a port's alignment cannot be used with its direction."""
     direction, alignment = _vector(port, "direction"), _vector(port, "alignment")
     if direction is None or alignment is None:

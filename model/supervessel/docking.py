@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from supervessel.assembly import Group, Joint, Way, groups, ways
-from supervessel.inertia import Body, combine, congruence
+from supervessel.inertia import Body, combine, congruence, orbiter_moments, symmetric
 from supervessel.quantities import Vector
 from supervessel.scene import Scene
 
@@ -104,7 +104,11 @@ def composite_body(scene: Scene, lookup: Lookup) -> Body:
         if group.attached is not None:
             lumped = [body.times(group.attached) for body in lumped]
         bodies += lumped
-    return combine(bodies)
+    whole = combine(bodies)
+    if scene.convention == "orbiter":
+        diagonal = symmetric(lambda i, j: whole.inertia[i, i] if i == j else ca.SX(0.0))
+        return Body(whole.mass, whole.centre, diagonal, whole.velocity, whole.spin)
+    return whole
 
 
 def placed_groups(scene: Scene, lookup: Lookup) -> list[PlacedGroup]:
@@ -118,13 +122,12 @@ def placed_groups(scene: Scene, lookup: Lookup) -> list[PlacedGroup]:
         for way in alternatives:
             _place(scene, way, lookup, inside, home, poses)
         attached = [_all_true(way, lookup) for way in alternatives]
-        flags = [flag for flag in attached if flag is not None]
-        if len(alternatives) == 1 or len(flags) < len(
-            attached
-        ):  # no other way can hold beside one that always does
-            always = next((i for i, flag in enumerate(attached) if flag is None), 0)
+        holding = [i for i, flag in enumerate(attached) if flag is None]
+        if len(alternatives) == 1 or holding:  # no other way can hold beside one that always does
+            always = holding[0] if holding else 0
             placed.append(PlacedGroup(poses[alternatives[always]], attached[always], inside[number]))
         else:
+            flags = [flag for flag in attached if flag is not None]
             holds, pose = _chosen(flags, [poses[way] for way in alternatives])
             placed.append(PlacedGroup(pose, holds, inside[number]))
     return placed
@@ -276,7 +279,8 @@ def vessel_body(scene: Scene, name: str, lookup: Lookup, pose: Pose) -> Body:
     vessel = scene.vessels[name]
     mass = lookup(f"{name}.mass", vessel.mass)
     if vessel.pmi is not None:
-        specific_inertia = ca.diag(lookup(f"{name}.pmi", vessel.pmi))
+        pmi = lookup(f"{name}.pmi", vessel.pmi)
+        specific_inertia = ca.diag(orbiter_moments(pmi) if scene.convention == "orbiter" else pmi)
     else:
         specific_inertia = constant(vessel.specific_inertia)
     centre = constant(vessel.centre_of_mass)

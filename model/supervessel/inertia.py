@@ -65,6 +65,18 @@ def symmetric(element: Callable[[int, int], ca.SX]) -> ca.SX:
     return ca.densify(matrix)
 
 
+def orbiter_moments(pmi: ca.SX) -> ca.SX:
+    """Returns the moments over mass, (3,) [m2], of the six points that Orbiter puts in a vessel's place.
+
+    pmi : (3,) [m2], any moments >= 0. Those of a rigid body come back; where one exceeds the sum of the other
+          two by D, these two are D larger.
+    Source: [CV] eqs. (3-7), with the absolute value that Orbiter takes under the root.
+    """
+    k1, k2, k3 = ca.vertsplit(pmi)
+    x, y, z = (0.5 * ca.fabs(square) for square in ((k2 + k3) - k1, (k3 + k1) - k2, (k1 + k2) - k3))
+    return ca.vertcat(y + z, z + x, x + y)
+
+
 def combine(bodies: Sequence[Body]) -> Body:
     """Returns bodies, seen from the same axes, as one; at least one of them must have mass.
 

@@ -112,14 +112,6 @@ def tensor_problem(tensor: NDArray[np.float64]) -> str:
     return ""
 
 
-def _pmi(value: Any) -> Vector:
-    problem = triangle_problem(value)
-    if problem:
-        raise ValueError(f" = {quantity(value, 'm2')}: {problem}")
-    k1, k2, k3 = value
-    return k1, k2, k3
-
-
 def vector_length(v: Vector) -> float:
     """Returns the length of a vector, without under- or overflow."""
     return math.hypot(*v)
@@ -133,16 +125,14 @@ def _direction(value: Any) -> Vector:
 
 
 Mass = Annotated[float, number("kg", "a finite number >= 0", 0.0)]
-Pmi = Annotated[
-    Vector, BeforeValidator(_pmi), vector("m2", "three finite numbers >= 0", low=0.0)
-]  # validators run from the right
+Pmi = Annotated[Vector, vector("m2", "three finite numbers >= 0", low=0.0)]
 Tensor = Annotated[Matrix, BeforeValidator(_tensor)]
 Position = Annotated[Vector, vector("m", "three finite numbers")]
 Direction = Annotated[
     Vector,
     BeforeValidator(_direction),
     vector("", "three finite numbers, a direction of any length > 0"),
-]
+]  # validators run from the right
 AngularVelocity = Annotated[Vector, vector("rad/s", "three finite numbers")]
 Seconds = Annotated[float, number("s", "a finite number > 0", 0.0, open_low=True)]
 Angle = Annotated[float, number("rad", "a number from 1e-6 to 1", 1e-6, 1.0)]

@@ -35,16 +35,17 @@ class Composite:
         return np.diag(self.inertia) / self.mass
 
 
-def sample_points(pmi: ArrayLike) -> Array:
+def sample_points(pmi: ArrayLike, convention: str = "rigid_body") -> Array:
     """Returns the six points, (6, 3) [m], whose equal masses have the given moments.
 
     pmi : (3,) [m2], mass-normalised moments along the axes
-    A square that is negative within rounding (a rod or a plate on the triangle's edge) counts as zero.
+    A square that is negative within rounding (a rod or a plate on the triangle's edge) counts as zero; by the
+    convention "orbiter" the absolute value of any square is taken.
     Source: [CV] eqs. (3-7), (12).
     """
     k1, k2, k3 = np.asarray(pmi, dtype=float)
     squares = 1.5 * np.array([k2 + k3 - k1, k3 + k1 - k2, k1 + k2 - k3])
-    half = np.diag(np.sqrt(np.maximum(squares, 0.0)))
+    half = np.diag(np.sqrt(np.abs(squares) if convention == "orbiter" else np.maximum(squares, 0.0)))
     return np.vstack([half, -half])
 
 
@@ -106,13 +107,14 @@ def composite(scene: Scene, values: Mapping[str, float] | None = None) -> Compos
 
     values : inputs by the FMU's names that differ from the scene's, `{"DG.mass": 12000.0}`
     A vessel given by a full tensor has its points on its own principal axes.
-    Source: [CV] eqs. (10), (11), with the products of inertia that the note leaves out.
+    Source: [CV] eqs. (10), (11), with the products of inertia that the note leaves out; by the convention
+    "orbiter" without.
     """
     points, masses = [], []
     for name, (R_root_vessel, origin) in poses(scene, values).items():
         vessel = scene.vessels[name]
         if vessel.pmi is not None:
-            own = sample_points(_override(f"{name}.pmi", vessel.pmi, values))
+            own = sample_points(_override(f"{name}.pmi", vessel.pmi, values), scene.convention)
         else:
             moments, axes = np.linalg.eigh(np.array(vessel.specific_inertia))
             own = sample_points(moments) @ axes.T
@@ -123,6 +125,8 @@ def composite(scene: Scene, values: Mapping[str, float] | None = None) -> Compos
     rho = r - barycentre
     second_moments = (m[:, None] * rho).T @ rho
     inertia = np.trace(second_moments) * np.eye(3) - second_moments
+    if scene.convention == "orbiter":
+        inertia = np.diag(np.diag(inertia))
     return Composite(float(m.sum()), barycentre, inertia)
 
 

@@ -115,6 +115,7 @@ def _one_of(*allowed: str) -> BeforeValidator:
 Name = Annotated[str, BeforeValidator(_text)]
 Names = Annotated[tuple[str, ...], BeforeValidator(_names)]
 Flag = Annotated[bool, BeforeValidator(_flag)]
+Convention = Literal["rigid_body", "orbiter"]
 Law = Literal["none", "decoupled", "principal", "tensor"]
 Kept = Literal["rate", "momentum"]
 Propagator = Literal["auto", "rk4", "dop853", "taylor", "exact", "split"]
@@ -223,10 +224,16 @@ class Outputs(Table):
 
 
 class Scene(Table):
-    """A docked assembly. Made by `load_scene` or `parse_scene`, which check it as a whole."""
+    """A docked assembly. Made by `load_scene` or `parse_scene`, which check it as a whole.
+
+    Under the convention "orbiter" the composite is that of the Orbiter simulator, for comparison: moments
+    that no rigid body has are taken by the absolute values of [CV] eqs. (3-5), and of the composite's tensor
+    the diagonal alone is kept.
+    """
 
     name: Name
     root: Name
+    convention: Annotated[Convention, _one_of(*get_args(Convention))] = "rigid_body"
     vessels: dict[str, Vessel]
     docks: tuple[Dock, ...] = ()
     inputs: Inputs = Inputs()

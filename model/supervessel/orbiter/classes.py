@@ -1,0 +1,281 @@
+"""Vessel classes: Orbiter's .cfg files, and tables of the vessels that exist only in its code."""
+
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from supervessel.orbiter.text import Place, ScenarioError, numbers, read_lines, read_text
+from supervessel.problems import quantity, unknown
+from supervessel.quantities import is_number
+
+TABLE_KEYS = (
+    "empty_mass",
+    "propellant",
+    "pmi",
+    "size",
+    "dock",
+    "source",
+    "passenger_mass",
+    "gravity_gradient_damping",
+)
+"""Keys of a class in a table; the last three are not used."""
+
+LONG_AGO = ("DockRef", "DockDir", "DockRot")
+"""Keys of the one docking port of old .cfg files; it comes before those of the list."""
+
+
+@dataclass(frozen=True)
+class ClassPort:
+    """A docking port: position [m], outward direction and alignment, Orbiter's left-handed vessel axes."""
+
+    position: tuple[float, float, float]
+    direction: tuple[float, float, float]
+    alignment: tuple[float, float, float]
+    place: Place
+
+
+@dataclass(frozen=True)
+class VesselClass:
+    """What a class says of a vessel.
+
+    empty_mass : [kg]
+    pmi        : mass-normalised moments, (3,) [m2]
+    tanks      : what each holds when full [kg], in the order of PRPLEVEL
+    fallback   : why the moments are a guess, "" where they are given
+    module     : the code that may change all this, "" where there is none or the numbers are the code's
+    """
+
+    empty_mass: float
+    mass_place: Place
+    pmi: tuple[float, float, float]
+    pmi_place: Place
+    fallback: str
+    tanks: tuple[float, ...]
+    ports: tuple[ClassPort, ...]
+    module: str = ""
+
+
+@dataclass(frozen=True)
+class Library:
+    """Where classes are looked for: a table, which goes first, and .cfg files by the folder above them."""
+
+    table_path: Path | None
+    table: Mapping[str, Any]
+    files: Mapping[Path, Sequence[Path]]
+
+
+def read_library(folders: Sequence[Path], table: Path | None) -> Library:
+    """Returns what folders and a table offer. Raises ScenarioError where one of them cannot be read."""
+    problems: list[str] = []
+    classes: dict[str, Any] = {}
+    if table is not None:
+        try:
+            classes = tomllib.loads(read_text(table))
+        except ScenarioError as error:
+            problems += error.problems
+        except (ValueError, RecursionError) as error:  # of integers too long, of arrays too deep
+            problems.append(f"{table}: is not TOML: {error}")
+    files = {}
+    for folder in folders:
+        if folder.is_dir():
+            files[folder] = sorted(p for p in folder.rglob("*") if p.suffix.lower() == ".cfg")
+        else:
+            problems.append(f"{folder}: is no folder that can be read")
+    if problems:
+        raise ScenarioError(problems)
+    return Library(table, classes, files)
+
+
+def find_class(library: Library, name: str, asked: str) -> VesselClass:
+    """Returns the class of a name, in any case; `asked` says who needs it.
+
+    Below a folder the file is, first of all, Vessels/NAME.cfg, then NAME.cfg, then any other.
+    Raises ScenarioError with what is missing or wrong.
+    """
+    keys = sorted((k for k in library.table if k.casefold() == name.casefold()), key=lambda k: k != name)
+    if keys and library.table_path is not None:
+        return _from_table(Place(library.table_path, key=f"[{keys[0]}]"), library.table[keys[0]])
+    parts = tuple(re.split(r"[\\/]", name.casefold()))
+    for folder, files in library.files.items():
+        ranked: dict[int, list[Path]] = {}
+        for file in files:
+            own = tuple(part.casefold() for part in file.relative_to(folder).with_suffix("").parts)
+            if own[-len(parts) :] == parts:
+                rank = {("vessels", *parts): 0, parts: 1}.get(own, 2)
+                ranked.setdefault(rank, []).append(file)
+        found = ranked[min(ranked)] if ranked else []
+        if len(found) > 1:
+            several = " and in ".join(map(str, found))
+            raise ScenarioError([f"{asked}: class {quantity(name)} is in {several}"])
+        if found:
+            return _from_cfg(found[0])
+    searched = [str(library.table_path)] if library.table_path else []
+    searched += [f"the .cfg files below {folder}" for folder in library.files]
+    where = " or ".join(searched) or "any file: neither --config FOLDER nor --table FILE.toml is given"
+    raise ScenarioError([f"{asked}: class {quantity(name)} is not in {where}"])
+
+
+def _from_cfg(path: Path) -> VesselClass:
+    """Returns the class of a .cfg file. The first line with a key counts, as in Orbiter."""
+    values: dict[str, tuple[Place, str]] = {}
+    ports: list[tuple[Place, str]] = []
+    inside = ""
+    for number, line in enumerate(read_lines(path), start=1):
+        word = line.upper()
+        if inside:
+            if word == f"END_{inside}":
+                inside = ""
+            elif inside == "DOCKLIST" and line:
+                ports.append((Place(path, number), line))
+        elif word.startswith("BEGIN_"):
+            inside = word.removeprefix("BEGIN_")
+        elif "=" in line:
+            key, _, value = line.partition("=")
+            values.setdefault(key.strip().casefold(), (Place(path, number), value.strip()))
+    problems = [f"{path}: BEGIN_{inside} without END_{inside}"] if inside else []
+    ports = [] if inside else ports
+    made = _class_of_values(path, values, ports, problems)
+    if made is None or problems:
+        raise ScenarioError(problems)
+    return made
+
+
+def _class_of_values(
+    path: Path,
+    values: Mapping[str, tuple[Place, str]],
+    lines: Sequence[tuple[Place, str]],
+    problems: list[str],
+) -> VesselClass | None:
+    def read(key: str, count: int, allowed: str) -> tuple[float, ...] | None:
+        """Returns the numbers of a key, none of them negative, None where there are none."""
+        if key.casefold() not in values:
+            return None
+        place, text = values[key.casefold()]
+        found = numbers(text.split(), count)
+        if found is None or min(found) < 0.0:
+            problems.append(f"{place}: {key} = {quantity(text)}: must be {allowed}")
+            return None
+        return found
+
+    if "baseclass" in values:
+        place, text = values["baseclass"]
+        problems.append(f"{place}: BaseClass = {quantity(text)} is not followed; give the class by --table")
+    mass = read("Mass", 1, "a number >= 0 (kg)")
+    pmi, size = read("Inertia", 3, "three numbers >= 0 (m2)"), read("Size", 1, "a number >= 0 (m)")
+    if "mass" not in values:
+        module = f", its module {quantity(values['module'][1])} has it" if "module" in values else ""
+        problems.append(f"{path}: no Mass{module}; give the class by --table")
+    elif "inertia" not in values and "size" not in values:
+        problems.append(f"{path}: neither Inertia nor Size, from which Orbiter would guess it")
+    tanks = _tanks(values, problems)
+    ports = _old_port(values, problems) + [p for p in (_port(*line, problems) for line in lines) if p]
+    if mass is None or (pmi is None and size is None):
+        return None
+    moments = _moments(pmi, size, values["inertia" if pmi is not None else "size"][0])
+    module = values["module"][1] if "module" in values else ""
+    return VesselClass(mass[0], values["mass"][0], *moments, tuple(tanks), tuple(ports), module)
+
+
+def _moments(
+    pmi: Sequence[float] | None, size: Sequence[float] | None, place: Place
+) -> tuple[tuple[float, float, float], Place, str]:
+    """Returns moments, their place, and why they are a guess: (2 s, 2 s, s) of the size s [m]."""
+    if pmi is not None:
+        x, y, z = pmi
+        return (x, y, z), place, ""
+    assert size is not None
+    s = float(size[0])
+    return (2.0 * s, 2.0 * s, s), place, f"no Inertia: Orbiter's guess (2 s, 2 s, s) from the size s = {s} m"
+
+
+def _tanks(values: Mapping[str, tuple[Place, str]], problems: list[str]) -> list[float]:
+    """Returns what the tanks hold: PropellantResource1, 2 ... (an efficiency may follow), or MaxFuel."""
+    tanks: list[float] = []
+    keys: list[str] = []
+    while f"propellantresource{len(keys) + 1}" in values:
+        keys.append(f"PropellantResource{len(keys) + 1}")
+    for key in keys or [key for key in ("MaxFuel",) if key.casefold() in values]:
+        place, text = values[key.casefold()]
+        words = text.split()
+        found = numbers(words, len(words)) if len(words) in (1, 2) else None
+        if found is None or found[0] < 0.0:
+            problems.append(f"{place}: {key} = {quantity(text)}: must be a number >= 0 (kg)")
+        else:
+            tanks.append(found[0])
+    return tanks
+
+
+def _old_port(values: Mapping[str, tuple[Place, str]], problems: list[str]) -> list[ClassPort]:
+    """Returns the port of DockRef, DockDir and DockRot, if all of them are there."""
+    if not all(key.casefold() in values for key in LONG_AGO):
+        return []
+    place = values[LONG_AGO[0].casefold()][0]
+    port = _port(place, " ".join(values[key.casefold()][1] for key in LONG_AGO), problems)
+    return [port] if port else []
+
+
+def _port(place: Place, line: str, problems: list[str]) -> ClassPort | None:
+    """Returns the port of a line: position, direction, alignment; what follows is not used."""
+    found = numbers(line.split()[:9], 9)
+    if found is None:
+        problems.append(
+            f"{place}: {quantity(line)}: must begin with nine numbers: position, direction, rotation"
+        )
+        return None
+    return _port_of(found, place)
+
+
+def _port_of(nine: Sequence[float], place: Place) -> ClassPort:
+    px, py, pz, dx, dy, dz, ax, ay, az = nine
+    return ClassPort((px, py, pz), (dx, dy, dz), (ax, ay, az), place)
+
+
+def _from_table(place: Place, table: Any) -> VesselClass:
+    """Returns the class that a table of TOML describes. Raises ScenarioError with every problem."""
+    if not isinstance(table, dict):
+        raise ScenarioError([f"{place}: must be a table"])
+    problems = [f"{place}: {unknown('key', key, TABLE_KEYS)}" for key in table if key not in TABLE_KEYS]
+
+    def read(key: str, count: int | None, allowed: str) -> tuple[float, ...] | None:
+        """Returns the numbers >= 0 of a key, None where there are none; a count of 0 is a single number."""
+        if key not in table:
+            return None
+        value = [table[key]] if count == 0 else table[key]
+        fits = isinstance(value, list) and (not count or len(value) == count)
+        if not (fits and all(is_number(x) and x >= 0 for x in value)):
+            problems.append(f"{place} {key} = {quantity(table[key])}: must be {allowed}")
+            return None
+        return tuple(map(float, value))
+
+    mass = read("empty_mass", 0, "a number >= 0 (kg)")
+    tanks = read("propellant", None, "a list of numbers >= 0 (kg)") or ()
+    pmi, size = read("pmi", 3, "three numbers >= 0 (m2)"), read("size", 0, "a number >= 0 (m)")
+    problems += [] if "empty_mass" in table else [f"{place}: empty_mass is missing"]
+    problems += [] if "pmi" in table or "size" in table else [f"{place}: neither pmi nor size"]
+    ports = _table_ports(place, table.get("dock", []), problems)
+    if mass is None or (pmi is None and size is None) or problems:
+        raise ScenarioError(problems)
+    key = "pmi" if pmi is not None else "size"
+    moments = _moments(pmi, size, _at(place, key))
+    return VesselClass(mass[0], _at(place, "empty_mass"), *moments, tanks, tuple(ports))
+
+
+def _at(place: Place, key: str) -> Place:
+    return Place(place.path, key=f"{place.key} {key}")
+
+
+def _table_ports(place: Place, rows: Any, problems: list[str]) -> list[ClassPort]:
+    if not isinstance(rows, list):
+        problems.append(f"{place} dock = {quantity(rows)}: must be a list of ports, nine numbers each")
+        return []
+    ports = []
+    for number, row in enumerate(rows):
+        here = _at(place, f"dock, port {number}")
+        if isinstance(row, list) and len(row) == 9 and all(map(is_number, row)):
+            ports.append(_port_of([float(x) for x in row], here))
+        else:
+            problems.append(f"{here} = {quantity(row)}: must be nine numbers: position, direction, rotation")
+    return ports

@@ -1,0 +1,278 @@
+"""From a scenario of Orbiter and its vessels' data to the text of a scene file, or every reason why not."""
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from supervessel.consistency import direction_problems
+from supervessel.loading import parse_scene
+from supervessel.orbiter.classes import ClassPort, Library, VesselClass, find_class, read_library
+from supervessel.orbiter.docks import Mention, assemblies, docks, mentions
+from supervessel.orbiter.scenario import Entry, Scenario, Ship, read_scenario
+from supervessel.orbiter.start import saved_motion, start_of
+from supervessel.orbiter.text import Note, ScenarioError, numbers
+from supervessel.orbiter.writing import Assembled, Member, Start, scene_text
+from supervessel.problems import SceneError, quantity, unknown
+from supervessel.quantities import triangle_problem
+from supervessel.scene import Convention, Scene
+
+LEVEL = re.compile(r"(\d{1,4}):(\S+)", re.ASCII)
+ATTACHED = re.compile(r"\d+:\d+,(\S+)", re.ASCII)
+
+
+@dataclass(frozen=True)
+class Imported:
+    """The text of a scene file, what was missing, guessed or left out, and the files that it is from."""
+
+    text: str
+    notes: tuple[str, ...]
+    sources: tuple[Path, ...]
+
+
+def import_scenario(
+    scenario: str | Path,
+    vessel: str = "",
+    config: Sequence[str | Path] = (),
+    table: str | Path | None = None,
+    convention: Convention | None = None,
+) -> Imported:
+    """Returns the scene file of an assembly in a scenario.
+
+    vessel     : a ship of the assembly, which becomes the root; "": the one that has the focus
+    config     : folders with the .cfg files of vessel classes, at any depth
+    table      : TOML file of classes that exist only in Orbiter's code; it goes before the .cfg files
+    convention : of the scene; None: "orbiter" where a vessel's moments ask for it, else "rigid_body"
+    Raises ScenarioError with every problem found, each with file and line.
+    """
+    found, library = _read(Path(scenario), [Path(c) for c in config], Path(table) if table else None)
+    problems: list[str] = []
+    notes: list[Note] = []
+    said = mentions(found, problems)
+    parts = assemblies(found, said)
+    try:
+        root = _root(found, vessel, parts)
+    except ScenarioError as error:
+        raise ScenarioError([*problems, *error.problems]) from None
+    names = next(part for part in parts if root in part)
+    names = [root, *(name for name in names if name != root)]
+    mated: list[Mention] = []
+    for dock in docks(found, names, said):
+        problems.append(dock) if isinstance(dock, str) else mated.append(dock)
+    classes = _classes(found, names, library, problems)
+    used = _used_ports(found, mated, classes, problems)
+    levels = {name: _levels(found.ships[name], problems) for name in names}
+    members = {}
+    for name, made in classes.items():
+        mass, full, origin = _masses(found.ships[name], made, levels[name], problems, notes)
+        ports = _usable_ports(found.ships[name], made, used[name], problems, notes)
+        members[name] = Member(found.ships[name], made, mass, full, origin, ports)
+    key = _convention(members, convention, problems, notes)
+    notes += _doubts(found, members)
+    saved = {name: saved_motion(found.ships[name], problems) for name in names}
+    if problems:
+        raise ScenarioError(dict.fromkeys(problems))
+    draft = Assembled(found, root, members, mated, key, [])
+    start, more = start_of(_checked(draft, Start()), draft, saved)
+    final = Assembled(found, root, members, mated, key, notes + more)
+    _checked(final, start)
+    sources = dict.fromkeys([found.path, *(member.of.mass_place.path for member in members.values())])
+    return Imported(scene_text(final, start), tuple(map(str, final.notes)), tuple(sources))
+
+
+def _read(path: Path, folders: Sequence[Path], table: Path | None) -> tuple[Scenario, Library]:
+    """Returns scenario and library. Raises ScenarioError with the problems of both."""
+    problems: list[str] = []
+    scenario = library = None
+    try:
+        scenario = read_scenario(path)
+    except ScenarioError as error:
+        problems += error.problems
+    try:
+        library = read_library(folders, table)
+    except ScenarioError as error:
+        problems += error.problems
+    if scenario is None or library is None:
+        raise ScenarioError(problems)
+    return scenario, library
+
+
+def _root(scenario: Scenario, vessel: str, parts: Sequence[Sequence[str]]) -> str:
+    """Returns the name of the root. Raises ScenarioError where it cannot be told."""
+    name = vessel or scenario.focus
+    docked = [" + ".join(part) for part in parts if len(part) > 1]
+    offer = f"; docked are {'; '.join(docked)}" if docked else "; no vessels are docked"
+    if not name:
+        raise ScenarioError([f"{scenario.path}: names no focus vessel; give one by --vessel{offer}"])
+    if name not in scenario.ships:
+        which = "" if vessel else "focus "
+        raise ScenarioError([f"{scenario.path}: {unknown(which + 'vessel', name, scenario.ships)}{offer}"])
+    if not vessel and not any(name in part and len(part) > 1 for part in parts):
+        focus = f"the focus vessel {quantity(name)} is not docked"
+        raise ScenarioError([f"{scenario.path}: {focus}; give one by --vessel{offer}"])
+    return name
+
+
+def _classes(
+    scenario: Scenario, names: Sequence[str], library: Library, problems: list[str]
+) -> dict[str, VesselClass]:
+    """Returns the classes of ships by their names, without those that cannot be had."""
+    classes = {}
+    for name in names:
+        ship = scenario.ships[name]
+        try:
+            classes[name] = find_class(library, ship.class_name, f"{ship.place}: {quantity(name)}")
+        except ScenarioError as error:
+            problems += error.problems
+    return classes
+
+
+def _used_ports(
+    scenario: Scenario, mated: Sequence[Mention], classes: Mapping[str, VesselClass], problems: list[str]
+) -> dict[str, set[int]]:
+    """Returns the numbers of the docked ports of each ship that its class has."""
+    used: dict[str, set[int]] = {name: set() for name in classes}
+    for dock in mated:
+        for name, port in ((dock.ship, dock.port), (dock.mate, dock.mate_port)):
+            count = len(classes[name].ports) if name in classes else port + 1
+            if port >= count:
+                has = f"ports 0 to {count - 1}" if count > 1 else "port 0 only" if count else "no ports"
+                class_name = quantity(scenario.ships[name].class_name)
+                problems.append(
+                    f"{dock.place}: {quantity(dock.ship)}: DOCKINFO {dock}: {quantity(name)} has no port "
+                    f"{port}; class {class_name} has {has}"
+                )
+            elif name in used:
+                used[name].add(port)
+    return used
+
+
+def _usable_ports(
+    ship: Ship, made: VesselClass, docked: set[int], problems: list[str], notes: list[Note]
+) -> dict[int, ClassPort]:
+    """Returns the ports by number; what no scene can have is a problem where it is docked, else left out."""
+    usable = {}
+    for number, port in enumerate(made.ports):
+        directions = {"direction": port.direction, "alignment": port.alignment}
+        wrong = [
+            f"port {number}.{key} = {quantity(value)}: must have a length greater than 0"
+            for key, value in directions.items()
+            if not any(value)
+        ]
+        wrong = wrong or list(direction_problems(f"port {number}", directions))
+        if not wrong:
+            usable[number] = port
+        elif number in docked:
+            problems += [f"{port.place}: {problem}" for problem in wrong]
+        else:
+            notes.append(Note(port.place, f"{wrong[0]}; free on {quantity(ship.name)}, left out"))
+    return usable
+
+
+@dataclass(frozen=True)
+class Levels:
+    """How full the tanks are, from 0 to 1: `given` by number, `others` for the rest; what says so."""
+
+    entry: Entry | None
+    given: Mapping[int, float]
+    others: float
+
+
+def _levels(ship: Ship, problems: list[str]) -> Levels:
+    """Returns what PRPLEVEL or FUEL says, the later of the two; without either tanks are full."""
+    known = [entry for entry in ship.entries if entry.key in ("PRPLEVEL", "FUEL")]
+    if not known:
+        return Levels(None, {}, 1.0)
+    entry = known[-1]
+    if entry.key == "FUEL":
+        return Levels(entry, {}, _fraction(entry, entry.words, problems))
+    given: dict[int, float] = {}
+    for word in entry.words:
+        match = LEVEL.fullmatch(word)
+        if match is None:
+            problems.append(f"{entry.place}: PRPLEVEL {quantity(word)}: must be TANK:LEVEL")
+        elif int(match[1]) in given:
+            problems.append(f"{entry.place}: PRPLEVEL {word}: tank {match[1]} has a level already")
+        else:
+            given[int(match[1])] = _fraction(entry, [match[2]], problems)
+    return Levels(entry, given, 0.0)
+
+
+def _masses(
+    ship: Ship, made: VesselClass, levels: Levels, problems: list[str], notes: list[Note]
+) -> tuple[float, float, str]:
+    """Returns the mass of a ship, that with full tanks [kg], and where its propellant is from."""
+    entry, count = levels.entry, len(made.tanks)
+    if entry is None and count:
+        notes.append(Note(ship.place, f"{quantity(ship.name)} has neither PRPLEVEL nor FUEL: taken as full"))
+    elif entry is not None and entry.key == "PRPLEVEL":
+        for tank in sorted(set(levels.given) - set(range(count))):
+            has = f"tanks 0 to {count - 1}" if count else "no tanks"
+            whose = f"class {quantity(ship.class_name)} of {quantity(ship.name)} has {has}"
+            problems.append(f"{entry.place}: PRPLEVEL of tank {tank}: {whose}")
+        for tank in sorted(set(range(count)) - set(levels.given)):
+            text = f"{quantity(ship.name)} has no level of tank {tank}: taken as empty"
+            notes.append(Note(entry.place, text))
+    loaded = sum(tank * levels.given.get(i, levels.others) for i, tank in enumerate(made.tanks))
+    full = sum(made.tanks)
+    said = f"{entry.place.short}: {entry}" if entry else "neither PRPLEVEL nor FUEL: full"
+    of = f"propellant {loaded} of {full} kg ({said})" if made.tanks else "no propellant"
+    return made.empty_mass + loaded, made.empty_mass + full, of
+
+
+def _fraction(entry: Entry, words: Sequence[str], problems: list[str]) -> float:
+    level = numbers(words, 1)
+    if level is None or not 0.0 <= level[0] <= 1.0:
+        problems.append(f"{entry.place}: {entry.key} {' '.join(words)}: a level must be a number from 0 to 1")
+        return 0.0
+    return level[0]
+
+
+def _convention(
+    members: Mapping[str, Member], asked: Convention | None, problems: list[str], notes: list[Note]
+) -> str:
+    """Returns why the scene has the key `convention = "orbiter"`, "" where it has not."""
+    broken = []
+    for name, member in members.items():
+        problem = triangle_problem(member.of.pmi)
+        if problem:
+            broken.append(Note(member.of.pmi_place, f"moments of {quantity(name)}: {problem}"))
+    if asked == "rigid_body":
+        problems += map(str, broken)
+    elif asked is None and broken:
+        hence = 'hence convention = "orbiter", which keeps no products of inertia'
+        notes += [Note(note.place, f"{note.text}; {hence}") for note in broken]
+        return "Some moments are those of no rigid body, see above. To fly a rigid one, mend them."
+    return "Asked for: Orbiter's own numbers, without products of inertia." if asked == "orbiter" else ""
+
+
+def _doubts(scenario: Scenario, members: Mapping[str, Member]) -> Iterator[Note]:
+    """Yields which moments are guessed, and what may belong to the masses and is not read."""
+    for ship in scenario.ships.values():
+        entry = ship.entry("ATTACHED")
+        match = ATTACHED.fullmatch(entry.words[0]) if entry and entry.words else None
+        if entry and match and match[1] in members and ship.name not in members:
+            attached = f"{quantity(ship.name)} is attached to {quantity(match[1])}"
+            yield Note(entry.place, f"{attached}: attachments are not read, its mass is in no vessel")
+    for name, member in members.items():
+        if member.of.fallback:
+            yield Note(member.of.pmi_place, f"moments of {quantity(name)}: {member.of.fallback}")
+        if member.of.module:
+            yield Note(
+                member.of.mass_place,
+                f"class {quantity(member.ship.class_name)} has code of its own, module "
+                f"{quantity(member.of.module)}, which may change what its file says",
+            )
+        for entry in member.ship.entries:
+            if "MASS" in (entry.key, *(word.upper() for word in entry.words)):
+                yield Note(entry.place, f"{entry}: a line for the code of {quantity(name)}, not read")
+
+
+def _checked(parts: Assembled, start: Start) -> Scene:
+    """Returns the scene that a text makes. Raises ScenarioError where it makes none."""
+    try:
+        return parse_scene(tomllib.loads(scene_text(parts, start)))
+    except SceneError as error:
+        made = f"{parts.scenario.path}: the scene made of it"
+        raise ScenarioError(f"{made}: {problem}" for problem in error.problems) from None
