@@ -29,6 +29,7 @@ stability: .venv/installed-dev
 bench: .venv/installed-dev
 	$(BIN)/python tests/bench/run.py
 	$(BIN)/python tests/bench/propagators.py
+	$(BIN)/python tests/bench/twin.py
 
 peers: .venv-peers/installed
 	PYTHONPATH=tests .venv-peers/bin/python tests/peers/peers.py

@@ -258,7 +258,8 @@ def _port(port: DrawnPort, panel: Panel, length: float) -> Group:
     items.append(Path((position, tick), stroke=colour, width=3.0))
     items.append(Path(regular_polygon(position, 2.5, 12), fill=DARK, closed=True))
     if port.switchable:
-        items.append(Path(regular_polygon(position, 8.0, 24), stroke=DARK, dash=2.5, closed=True))
+        ring = regular_polygon(position, 8.0, 24)
+        items += [Path(ring[i : i + 3], stroke=DARK) for i in range(0, 24, 4)]
     return Group("port", items, port.name)
 
 

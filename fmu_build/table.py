@@ -117,13 +117,14 @@ def _dependencies(
 def _after_change(scene: Scene, model: Equations, z: ca.SX, p: ca.SX, c: ca.SX) -> ca.SX:
     """Returns what stands for the states after a change of inputs: its structure tells what they follow from.
 
-    A state that is the angular momentum is what a change of mass or pose keeps; the angular velocity follows.
+    A state that is the angular momentum is what a change of mass or pose keeps. An angular velocity jumps by
+    what follows from the inputs as they were and are; a dock that opens or closes makes either one jump.
     """
     if model.change is None:
         return z
     rate = z[4:]
     if "momentum" in scene.keeps.values() and not keeps_momentum(scene):
-        rate = model.change.keep_momentum(rate, ca.SX.sym("before", c.numel()), c)
+        rate += model.change.keep_momentum(ca.SX.sym("kept", 3), ca.SX.sym("before", c.numel()), c)
     flags = [
         flag for name, flag in zip(model.p_names, ca.vertsplit(p), strict=True) if name.endswith(".docked")
     ]

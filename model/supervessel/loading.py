@@ -31,6 +31,11 @@ def load_scene(path: str | Path) -> Scene:
     path : the file; its name stands before each problem
     Raises SceneError with every problem of the file: what cannot be read, TOML that is none, unknown
     or missing keys, impossible numbers, names that do not exist, docks that make no tree.
+
+    Example:
+        >>> from supervessel import load_scene
+        >>> load_scene("examples/iss_dg.toml").root
+        'ISS'
     """
     path = Path(path)
     try:
@@ -50,6 +55,12 @@ def parse_scene(raw: Mapping[str, Any], source: str = "scene") -> Scene:
     raw    : what `tomllib` makes of a scene file
     source : stands before each problem
     Raises SceneError with every problem found.
+
+    Example:
+        >>> from supervessel import parse_scene
+        >>> ball = {"mass": 1000.0, "pmi": [1.0, 1.0, 1.0]}
+        >>> parse_scene({"name": "ball", "root": "B", "vessels": {"B": ball}}).rotation.law
+        'tensor'
     """
     problems: list[str] = []
     scene = None

@@ -1,57 +1,94 @@
 """The twin: the FMU's own equations as CasADi functions, for control design and estimation."""
 
+from collections.abc import Iterable
+from dataclasses import dataclass
 from functools import cached_property
-from typing import get_args
+from os import PathLike
+from pathlib import Path
+from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from supervessel.changes import followed
-from supervessel.equations import Equations, composite_slices, equations, p_start, simplification
+from supervessel.attitude import to_inertial, unit
+from supervessel.control.conventions import acados_model, do_mpc_model
+from supervessel.control.error_state import error_rate, retracted, state_error
+from supervessel.control.functions import TwinFunction
+from supervessel.control.linear import discrete_model, linear_model
+from supervessel.control.native import generate
+from supervessel.control.plant import Plant
+from supervessel.equations import composite_slices
 from supervessel.inertia import from_upper_triangle
-from supervessel.propagators.exact import free_step
-from supervessel.scene import Propagator, Scene
+from supervessel.principal import principal
+from supervessel.problems import unknown
+from supervessel.rotation import LAWS
 
-GAP = 1e-8
-"""Least difference of principal moments, over the largest, for derivatives of free motion by p."""
-
-
-X_NAMES = (
-    *(f"state.attitude[{i}]" for i in range(1, 5)),
-    *(f"state.angular_velocity[{i}]" for i in range(1, 4)),
+FUNCTIONS = (
+    "composite",
+    "ode",
+    "step",
+    "longest_step",
+    "outputs",
+    "change",
+    "error",
+    "retract",
+    "error_ode",
+    "linearise",
+    "discretise",
+    "trim",
+    "principal",
+    "invariants",
 )
-"""Names of the FMU's states, which the twin's are wherever the angular velocity is one."""
+"""Names of the twin's functions of fixed form."""
 
 
-class Twin:
+@dataclass(frozen=True)
+class Scales:
+    """Magnitudes that make a problem's numbers about 1: divide by them.
+
+    x : (7,), u : (m,) [N m], p : (n,), e : (6,), the error state; h : [s]
+    """
+
+    x: NDArray[np.float64]
+    u: NDArray[np.float64]
+    p: NDArray[np.float64]
+    e: NDArray[np.float64]
+    h: float
+
+
+class Twin(Plant):
     """CasADi functions of a scene, from the very expressions that its FMU is generated from.
 
     x = (attitude w, x, y, z; angular velocity [rad/s], body axes), (7,)
-    u = the torque inputs [N m], (3,) or (0,)
+    u = the inputs that act, torque [N m] first, then forces [N] and torques on vessels, (m,)
     p = the FMU's other inputs, (n,), in the order of its model description
     h = step [s]
+    e = (error of attitude [rad], of angular velocity [rad/s]) about a reference, body axes, (6,)
 
-    Each function's numbers are the FMU's to the last bit, for composite, ode, outputs but principal ones, and
-    a single sub-step of "rk4", "dop853" and "taylor": both evaluate the same operations in the same order,
-    and only + - * / and the square root occur, which IEEE 754 rounds correctly everywhere. Taylor steps,
-    free motion and principal axes agree to a few u (1 + angle turned).
+    `composite`, `ode`, `step`, `longest_step`, `outputs` and `rollout` give the FMU's numbers; `error`,
+    `retract`, `error_ode`, `linearise`, `discretise`, `trim`, `principal`, `invariants` are for control
+    design. All have named arguments, are made when first used, and check numbers that they are called with
+    (`TwinFunction`). p, u, x, h are symbols; p_names, u_names, x_names, y_names the FMU's names; p_start and
+    x_start the scene's values.
 
-    composite    : p -> mass [kg], barycentre (3,) [m], inertia (3, 3) [kg m2], pmi (3,) [m2]
-    ode          : x, u, p -> x_dot
-    step         : x, u, p, h -> x_next, attitude at unit length, by one step of the scene's propagator; of
-                   "auto" by the method that it takes with torque
-    longest_step : x, u, p -> h_max, the longest sub-step [s] that the FMU takes from x by "rk4"
-    outputs      : x, u, p -> y, the FMU's outputs but error_estimate, which follows from a step
+    Each number of composite, ode, outputs but principal ones, and of a single sub-step of "rk4", "dop853" and
+    "taylor" is the FMU's to the last bit: both evaluate the same operations in the same order, and only
+    + - * / and the square root occur, which IEEE 754 rounds correctly everywhere. Taylor steps, free motion
+    and principal axes agree to a few u (1 + angle turned).
 
-    Directions in p may have any length whose square a double holds. Nothing in p is checked: the FMU
-    refuses a negative mass or parallel port axes, the twin is a formula that an optimiser may take there.
+    Directions in p may have any length whose square a double holds. Nothing in p is checked but that it is
+    finite: the FMU refuses a negative mass or parallel port axes, the twin is a formula that an optimiser may
+    take there.
 
     scene      : from `load_scene`
     propagator : "rk4" and so on, instead of the scene's
     doublings  : of free motion, "exact" and "split", in a step: room for a phase of FIRST_ANGLE 2^doublings,
                  about the angle turned; where more is needed the step is NaN, as it is beyond 2e9 rad (which
                  the FMU discards) and as is "exact" with a torque
+    error_form : "rotvec", "mrp" or "vec", of the attitude's error, see `error`
+    fixed      : inputs that shall be numbers, not elements of p: True for all; names, "DG.mass" or
+                 "DG.nose.position" for its three elements, for the scene's values; or a dictionary of values
 
     Derivatives of a step are right wherever values are, with one exception: those of free motion by p need
     principal axes. They are off by about 1e-15/gap, relatively, gap being the least difference of principal
@@ -59,108 +96,257 @@ class Twin:
     no axes.
 
     Example:
-        twin = Twin(load_scene("examples/iss_dg.toml"))
-        x_next = twin.step(twin.x_start, [0, 0, 100], twin.p_start, 0.1)
+        >>> from supervessel import Twin, load_scene
+        >>> twin = Twin(load_scene("examples/iss_dg.toml"))
+        >>> x_next = twin.step(twin.x_start, [0, 0, 100], twin.p_start, 0.1)
+        >>> lighter = Twin(twin.scene, fixed={"DG.mass": 12000.0})
+        >>> lighter.p_names[0], len(lighter.p_names)
+        ('DG.nose.position[1]', 9)
     """
 
-    def __init__(self, scene: Scene, *, propagator: Propagator | None = None, doublings: int = 8) -> None:
-        if propagator not in (None, *get_args(Propagator)):
-            raise ValueError(f"propagator = {propagator!r}: must be one of {', '.join(get_args(Propagator))}")
-        if not (isinstance(doublings, int) and 0 <= doublings <= 64):
-            raise ValueError(f"doublings = {doublings!r}: must be a whole number from 0 to 64")
-        if propagator is not None:
-            rotation = scene.rotation.model_copy(update={"propagator": propagator})
-            scene = scene.model_copy(update={"rotation": rotation})
-        self.scene, self.doublings = scene, doublings
-        model = self._model = equations(scene)
-        self.p_names, self.u_names, self.x_names = model.p_names + model.k_names, model.u_names, X_NAMES
-        self.y_names = tuple(name for name in model.y_names if name != "error_estimate")
-        self.p = ca.SX.sym("p", len(self.p_names))
-        self.u = ca.SX.sym("u", len(self.u_names))
-        self.x = ca.SX.sym("x", len(self.x_names))
-        self.h = ca.SX.sym("h")
-        # CasADi turns x * (1/y) into x/y when the two meet in one graph. The FMU computes 1/y once for each
-        # change of inertia, so the twin must multiply by it as well to give the same last bit.
-        with simplification(False):
-            self._compose(model)
-
-    def _compose(self, model: Equations) -> None:
-        """Makes functions of p out of those of c."""
-        shaping = len(model.p_names)
-        c = model.composite(self.p[:shaping])
-        where = composite_slices()
-        inertia = from_upper_triangle(c[where["inertia"]])
-        args, names = [self.x, self.u, self.p], ["x", "u", "p"]
-        self.composite = ca.Function(
-            "composite",
-            [self.p],
-            [c[where["mass"]], c[where["barycentre"]], inertia, c[where["pmi"]]],
-            ["p"],
-            ["mass", "barycentre", "inertia", "pmi"],
-        )
-        at = (self.x, self.u, c)
-        self.ode = ca.Function("ode", args, [model.ode(*at)], names, ["x_dot"])
-        longest = self.scene.rotation.max_angle_step / ca.sqrt(model.fastest_square(*at))
-        self.longest_step = ca.Function("longest_step", args, [longest], names, ["h_max"])
-        a = model.axes(c)
-        step = self._step(model, c, a)
-        self.step = ca.Function("step", [*args, self.h], [step], [*names, "h"], ["x_next"])
-        y = model.outputs(*at, a, 0.0)
-        shown = [i for i, name in enumerate(model.y_names) if name in self.y_names]
-        self.outputs = ca.Function("outputs", args, [y[shown]], names, ["y"])
-
-    def _step(self, model: Equations, c: ca.SX, a: ca.SX) -> ca.SX:
-        """Returns the state after h by the scene's method."""
-
-        def free(x: ca.SX) -> ca.SX:
-            axes = a[model.axes_slices["free"]]
-            end = free_step(x, axes[:3], ca.reshape(axes[3:], 3, 3), self.h, self.doublings)
-            return end + _zero_without_derivative_at_equal(axes[:3])
-
-        def stepped(x: ca.SX) -> ca.SX:
-            return model.step.call([x, self.u, c, self.h])[0]
-
-        if model.plan.method is None:
-            pushed = ca.sumsqr(self.u) > 0.0 if self.u_names else ca.SX(0.0)
-            return free(self.x) + ca.if_else(pushed, ca.SX.nan(), 0.0)
-        if model.plan.free == "between kicks":
-            return stepped(free(stepped(self.x)))
-        return stepped(self.x)
-
     @cached_property
-    def change(self) -> ca.Function:
-        """x, p, p_next -> x_next: what becomes of the state when the inputs p change, at one instant.
+    def error(self) -> TwinFunction:
+        """x, x_ref -> e, (6,): attitude's error and difference of the rates, about a reference.
 
-        What undocks leaves with its share; masses, then poses change and keep rate or momentum as the scene
-        says; what docks brings its momentum along, moving as the inputs of motion at contact in p_next say.
+        The attitude's error, (3,) [rad], is that of q_ref* q in body axes, by `error_form`: "rotvec" the
+        rotation vector, "mrp" 4 times the modified Rodrigues parameters, "vec" 2 times the vector part; all
+        the same to first order. q and -q give the same error, so that no controller unwinds; value,
+        gradient and Hessian are finite everywhere. As a cost's residual it makes Gauss-Newton one line.
+
+        Example:
+            >>> twin.error([-0.8, 0, 0, -0.6, 0, 0, 0.5], [1, 0, 0, 0, 0, 0, 0])
+            DM([-0, -0, 1.287, 0, 0, 0.5])
         """
-        model = self._model
-        p_next = ca.SX.sym("p_next", self.p.numel())
-        omega, shaping = self.x[4:], len(model.p_names)
-        if model.change is not None:
-            inputs = (omega, self.p[:shaping], p_next[:shaping], p_next[shaping:])
-            with simplification(False):
-                omega = followed(self.scene, model.change, model.composite, inputs)
-        x_next = ca.vertcat(self.x[:4], omega)
-        return ca.Function("change", [self.x, self.p, p_next], [x_next], ["x", "p", "p_next"], ["x_next"])
+        x_ref = ca.SX.sym("x_ref", 7)
+        e = state_error(self.x, x_ref, self.error_form)
+        return self._function("error", {"x": self.x, "x_ref": x_ref}, {"e": e})
 
     @cached_property
-    def x_start(self) -> NDArray[np.float64]:
-        """The scene's state at the start, (7,)."""
-        rotation = self.scene.rotation
-        return np.array([*rotation.attitude, *rotation.angular_velocity])
+    def retract(self) -> TwinFunction:
+        """x_ref, e -> x, (7,): the state that has the error e about x_ref, the inverse of `error`.
+
+        NaN for "vec" where the attitude's error is longer than 2.
+
+        Example:
+            >>> x = twin.retract(twin.x_start, [0.1, 0, 0, 0, 0, 1e-3])
+            >>> [round(v, 12) for v in twin.error(x, twin.x_start).full().ravel().tolist()]
+            [0.1, 0.0, 0.0, 0.0, 0.0, 0.001]
+        """
+        x_ref, e = ca.SX.sym("x_ref", 7), ca.SX.sym("e", 6)
+        x = retracted(x_ref, e, self.error_form)
+        return self._function("retract", {"x_ref": x_ref, "e": e}, {"x": x})
 
     @cached_property
-    def p_start(self) -> NDArray[np.float64]:
-        """The scene's values of p, (n,)."""
-        return np.append(p_start(self.scene), np.zeros(len(self._model.k_names)))
+    def error_ode(self) -> TwinFunction:
+        """e, u, p, x_ref, acceleration_ref -> e_dot, (6,), about a reference that moves on its own.
 
+        acceleration_ref : (3,) [rad/s2], how the reference's rate changes; left out it is zero
 
-def _zero_without_derivative_at_equal(moments: ca.SX) -> ca.SX:
-    """Returns 0; its derivative is NaN where moments, (3,), ascending, are too close to tell axes by."""
-    if moments.is_constant():
-        return ca.SX(0.0)
-    least = ca.fmin(moments[1] - moments[0], moments[2] - moments[1])
-    beyond = least - GAP * moments[2]
-    # sqrt(0) has the derivative infinity; that of what it is taken from is 0 below the limit
-    return ca.if_else(beyond <= 0.0, ca.sqrt(ca.fmax(beyond, 0.0)), 0.0)
+        Example:
+            >>> twin.error_ode(e=[0.1, 0, 0, 0, 0, 0], x_ref=[1, 0, 0, 0, 0, 0, 0.5])["e_dot"][:3]
+            DM([0, -0.05, 0])
+        """
+        x_ref, e, a_ref = (ca.SX.sym(*s) for s in (("x_ref", 7), ("e", 6), ("acceleration_ref", 3)))
+        x = ca.vertcat(retracted(x_ref, e, self.error_form)[:4], x_ref[4:] + e[3:])
+        acceleration = self._model.ode(x, self.u, self._c)[4:]
+        e_dot = error_rate(e, x_ref[4:], acceleration, a_ref, self.error_form)
+        args = {"e": e, "u": self.u, "p": self.p, "x_ref": x_ref, "acceleration_ref": a_ref}
+        return self._function("error_ode", args, {"e_dot": e_dot})
+
+    @cached_property
+    def linearise(self) -> TwinFunction:
+        """x, u, p -> A (6, 6), B (6, m), E (6, n): e_dot = A e + B du + E dp about x, u, p.
+
+        Of the error state, so that a Riccati equation has a solution; the seven numbers of x have one
+        direction that nothing controls. The same for each form of the error.
+
+        Example:
+            >>> A, B, E = twin.linearise(twin.x_start, [0, 0, 0], twin.p_start)
+            >>> A.shape, B.shape, E.shape
+            ((6, 6), (6, 3), (6, 10))
+        """
+        acceleration = self._model.ode(self.x, self.u, self._c)[4:]
+        model = linear_model(self.x, self.u, self.p, acceleration)
+        return self._function("linearise", self._at, dict(zip("ABE", model, strict=True)))
+
+    @cached_property
+    def discretise(self) -> TwinFunction:
+        """x, u, p, h -> A (6, 6), B (6, m), E (6, n): e_next = A e + B du + E dp over one `step` from x.
+
+        The derivative of `step` itself, not the exponential of `linearise`: right about any trajectory, and
+        the error is that of the propagator. u and p are held over the step.
+
+        Example:
+            >>> A, B, E = twin.discretise(twin.x_start, [0, 0, 0], twin.p_start, 0.1)
+            >>> round(float(A[0, 3]), 6)
+            0.1
+        """
+        model = discrete_model(self.x, self.u, self.p, self._stepped(self._c, self._a))
+        return self._function("discretise", self._at | {"h": self.h}, dict(zip("ABE", model, strict=True)))
+
+    @cached_property
+    def trim(self) -> TwinFunction:
+        """x, p -> u, the torque that holds the rate of x steady: a relative equilibrium; no forces.
+
+        omega x J omega, zero for spins about `principal` axes; with J omega + h where ports move.
+
+        Example:
+            >>> u = twin.trim(twin.x_start, twin.p_start)
+            >>> float(ca.norm_inf(twin.ode(twin.x_start, u, twin.p_start)[4:])) < 1e-18
+            True
+        """
+        self.check_torque("trim")
+        omega = self.x[4:]
+        torque = ca.cross(omega, self._turning @ omega + self._spin)
+        u = ca.vertcat(torque, ca.SX.zeros(len(self.u_names) - 3))
+        return self._function("trim", {"x": self.x, "p": self.p}, {"u": u})
+
+    @cached_property
+    def principal(self) -> TwinFunction:
+        """p -> moments (3,) [kg m2], ascending, and axes (3, 3), R_body_principal, of what the law turns.
+
+        A spin about a column of axes needs no torque: about the first and last it is stable, about the
+        middle one it is not.
+
+        Example:
+            >>> moments, axes = twin.principal(twin.p_start)
+            >>> spin = ca.vertcat(1, 0, 0, 0, 0.01 * axes[:, 2])
+            >>> float(ca.norm_inf(twin.ode(spin, [0, 0, 0], twin.p_start)[4:])) < 1e-18
+            True
+        """
+        moments, axes = principal(self._turning)
+        return self._function("principal", {"p": self.p}, {"moments": moments, "axes": axes})
+
+    @cached_property
+    def invariants(self) -> TwinFunction:
+        """x, p -> kinetic_energy [J], angular_momentum (3,) [N m s], inertial axes: constant without torque.
+
+        Of the tensor that the law turns: J for "tensor", its diagonal for "principal"; "decoupled" and "none"
+        keep the rate itself, and a unit tensor stands for J.
+
+        Example:
+            >>> round(float(twin.invariants(twin.x_start, twin.p_start)[0]), 3)
+            198.191
+        """
+        omega = self.x[4:]
+        momentum = self._turning @ omega
+        results = {
+            "kinetic_energy": 0.5 * ca.dot(omega, momentum),
+            "angular_momentum": to_inertial(unit(self.x[:4]), momentum + self._spin),
+        }
+        return self._function("invariants", {"x": self.x, "p": self.p}, results)
+
+    def scales(self, time: float) -> Scales:
+        """Returns magnitudes for a manoeuvre that turns the body by about 1 rad in `time` [s].
+
+        Example:
+            >>> scales = twin.scales(60.0)
+            >>> scaled = ca.SX.sym("u", 3)  # about 1
+            >>> x_dot = twin.ode(x=twin.x, u=scales.u * scaled, p=twin.p)["x_dot"] / scales.x
+        """
+        if not (np.isfinite(time) and time > 0.0):
+            raise ValueError(f"scales: time = {time!r} s: must be positive")
+        rate = np.full(3, 1.0 / time)
+        moment = float(ca.trace(self.composite(self.p_start)[2])) / 3.0
+        torque = np.full(len(self.u_names), moment / time**2)
+        groups = [name.partition("[")[0] for name in self.p_names]
+        p = [
+            max(abs(v) for v, g in zip(self.p_start, groups, strict=True) if g == group) or 1.0
+            for group in groups
+        ]
+        return Scales(np.array([1.0] * 4 + [*rate]), torque, np.array(p), np.array([1.0] * 3 + [*rate]), time)
+
+    def check_torque(self, what: str) -> None:
+        """Raises ValueError where the scene has no torque input, which `what` needs.
+
+        Example:
+            >>> twin.check_torque("my controller")
+        """
+        if not self.scene.inputs.torque:
+            raise ValueError(
+                f'{what}: scene "{self.scene.name}" has no torque input; put "torque = true" under [inputs]'
+            )
+
+    @cached_property
+    def _spin(self) -> ca.SX:
+        """Angular momentum, (3,), of what moves relative to the body axes, as far as the law knows it."""
+        known = "momentum" in self._model.slices and LAWS[self.scene.rotation.law].gyroscopic_term
+        return self._c[self._model.slices["momentum"]][:3] if known else ca.SX.zeros(3)
+
+    @cached_property
+    def _turning(self) -> ca.SX:
+        """The tensor, (3, 3), whose free motion the law describes."""
+        inertia = from_upper_triangle(self._c[composite_slices()["inertia"]])
+        return LAWS[self.scene.rotation.law].turning(inertia)
+
+    def generate(
+        self,
+        folder: str | PathLike[str],
+        functions: Iterable[str | ca.Function] = ("composite", "ode", "step", "outputs"),
+        *,
+        derivatives: int = 1,
+    ) -> dict[str, ca.Function]:
+        """Returns functions by name, compiled to machine code and loaded back as `ca.external`.
+
+        folder      : where C and library go, made if need be; what is there already is not compiled again
+        functions   : names of this twin's, or functions themselves, `twin.rollout(20)` or any other of CasADi
+        derivatives : of what order derivatives are compiled too: 0, 1, or 2 for exact Hessians
+        The numbers are those of the originals to the last bit where only + - * / and the square root occur.
+        Raises ValueError for names that are none, BuildError if the compiler of package fmu_build fails.
+
+        Example:
+            >>> step = twin.generate("build/twin", ["step"], derivatives=0)["step"]
+            >>> at = twin.x_start, [0, 0, 100], twin.p_start, 0.1
+            >>> float(ca.norm_inf(step(*at) - twin.step(*at)))
+            0.0
+        """
+        if isinstance(functions, str | ca.Function):
+            functions = (functions,)
+        chosen = [self._named(f) if isinstance(f, str) else f for f in functions]
+        compiled = generate(chosen, Path(folder), f"{self.scene.name}_twin", derivatives)
+        return {
+            f.name(): f.like(c) if isinstance(f, TwinFunction) else c
+            for f, c in zip(chosen, compiled, strict=True)
+        }
+
+    def to_acados(self, step: float | None = None) -> Any:
+        """Returns the plant as `acados_template.AcadosModel`: x, u, p, explicit and implicit ode.
+
+        step : [s], for discrete dynamics, disc_dyn_expr, by `step`
+        Raises ImportError without acados_template, ValueError for a scene without torque input.
+
+        Example:
+            >>> model = twin.to_acados(step=0.5)  # doctest: +SKIP
+        """
+        self.check_torque("to_acados")
+        return acados_model(self, step)
+
+    def to_do_mpc(self, step: float | None = None) -> Any:
+        """Returns the plant as `do_mpc.model.Model`, not yet set up: states attitude and angular_velocity.
+
+        Input torque (u where forces act too), parameter p. Add what your cost needs, then call its setup().
+        step : [s], for a discrete model by `step`; None: a continuous one
+        Raises ImportError without do_mpc, ValueError for a scene without torque input.
+
+        Example:
+            >>> model = twin.to_do_mpc(step=0.5)  # doctest: +SKIP
+        """
+        self.check_torque("to_do_mpc")
+        return do_mpc_model(self, step)
+
+    def to_dae(self) -> dict[str, ca.SX]:
+        """Returns the plant as `ca.integrator` takes it: x, u, p, ode.
+
+        Example:
+            >>> flow = ca.integrator("flow", "cvodes", twin.to_dae(), 0.0, 1.0)
+            >>> flow(x0=twin.x_start, u=[0, 0, 100], p=twin.p_start)["xf"].shape
+            (7, 1)
+        """
+        return {"x": self.x, "u": self.u, "p": self.p, "ode": self.ode(self.x, self.u, self.p)}
+
+    def _named(self, name: str) -> TwinFunction:
+        """Returns one of the functions by its name."""
+        if name not in FUNCTIONS:
+            raise ValueError(f"generate: {unknown('function', name, FUNCTIONS)}")
+        function: TwinFunction = getattr(self, name)
+        return function

@@ -611,6 +611,8 @@ def observed(
 ) -> dict[str, set[str]]:
     """Returns by variable with which it changes, in the last bit at least, at any of some points.
 
+    The inputs have changed before: what a change of one makes may depend on that of another.
+
     running : "exchange", "steps", or None while initialising; knowns are the inputs, with the states in model
         exchange and the parameters before the start
     """
@@ -623,11 +625,13 @@ def observed(
         assert instance.set(point) == OK
         if running:
             assert instance.exit() == OK
-            point = {name: point[name] for name in input_names(raw)}
+            moved = random_point(raw, generator)
+            point = {name: moved[name] for name in input_names(raw)}
         if running == "steps":
             assert instance.step(0.5) == OK
-        elif running == "exchange":
-            assert instance.run() == OK
+        if running:
+            assert instance.set(point) == OK
+        if running == "exchange":  # still in event mode
             point |= {state: instance.get(state) for state in STATES}
         references = [instance.references[name] for name in names]
         read = instance.fmu.getFloat64 if fmi == 3 else instance.fmu.getReal
@@ -643,12 +647,27 @@ def observed(
     return found
 
 
+def without_kept(found: Mapping[str, set[str]]) -> dict[str, set[str]]:
+    """Returns dependencies without those of the angular momentum on poses, which keep it: only rounding shows."""
+    poses = tuple(f".{part}[{i}]" for part in ("position", "direction", "alignment") for i in (1, 2, 3))
+    return {
+        unknown: {
+            name for name in names if not (unknown.startswith("angular_momentum") and name.endswith(poses))
+        }
+        for unknown, names in found.items()
+    }
+
+
 @PART
 @FMI
 @SCENE
 def test_declared_dependencies_are_exactly_those_that_the_fmu_shows(raw, fmi, part):
     running = None if part == "initial unknowns" else "exchange"
-    assert dependencies(raw, fmi, part) == observed(raw, fmi, unknowns(raw, part), running)
+    found = observed(raw, fmi, unknowns(raw, part), running)
+    declared = dependencies(raw, fmi, part)
+    if running:
+        declared, found = without_kept(declared), without_kept(found)
+    assert declared == found
 
 
 @FMI
@@ -660,4 +679,5 @@ def test_declared_dependencies_on_inputs_are_those_that_show_between_steps(raw, 
         for part in ("outputs", "derivatives")
         for unknown, known in dependencies(raw, fmi, part).items()
     }
-    assert declared == observed(raw, fmi, [*output_names(raw), *RATES], "steps")
+    found = observed(raw, fmi, [*output_names(raw), *RATES], "steps")
+    assert without_kept(declared) == without_kept(found)

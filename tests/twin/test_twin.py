@@ -1,12 +1,9 @@
 """The CasADi twin: its interface, the FMU's numbers to the last bit, the numpy reference, derivatives."""
 
-import inspect
-import textwrap
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -14,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from supervessel import Scene, Twin, load_scene, reference
+from supervessel import Scene, Twin, reference
 from support import EPS, ISS_DG, OK, body, flying, scene, variant
 
 Array = NDArray[np.float64]
@@ -42,6 +39,9 @@ MASS_ULPS = 36
 # products along 5 joints, with a 3-term dot product in triad, pose and square each, so that 3^3 * 12 terms of
 # some 20 roundings meet, on either side. The partials of J^-1 carry the condition number twice.
 DERIVATIVE_ULPS = 2 * 27 * 12 * 20
+# The FMU and the twin differentiate the same operations and multiply the same partials, in another order: 27
+# terms of up to 12 products, a rounding each, on either side. Nothing is inverted twice: no condition number.
+CHAIN_ULPS = 2 * 27 * 12
 TINY = 1e-30  # step along the imaginary axis; its square is below the last bit of everything here
 
 
@@ -540,6 +540,39 @@ def test_derivatives_of_the_step_are_those_by_complex_step(seed: int, wrt: str) 
         assert_jacobian(value[rows], truth[rows], names, at=at[wrt], size=size, bound=bound)
 
 
+def response(twin: Twin) -> ca.Function:
+    """Returns the twin's outputs and rates and their Jacobian by p, u, x, as a function of those."""
+    rows = ca.vertcat(twin.outputs(twin.x, twin.u, twin.p), twin.ode(twin.x, twin.u, twin.p))
+    knowns = ca.vertcat(twin.p, twin.u, twin.x)
+    return ca.Function("response", [knowns], [ca.jacobian(rows, knowns)])
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_directional_and_adjoint_derivatives_of_the_fmu_are_the_twins(seed: int) -> None:
+    raw, twin, rng = random_scene(seed), twin_of(seed), np.random.default_rng(2000 + seed)
+    knowns = [*twin.p_names, *twin.u_names, *twin.x_names]
+    unknowns = [*twin.y_names, *(f"der({name})" for name in twin.x_names)]
+    jacobian = response(twin)
+    with flying(raw) as fmu:
+        for _ in range(STEPS):
+            x = np.concatenate([fmu.get("state.attitude"), fmu.get("state.angular_velocity")])
+            p, u = random_inputs(twin, rng)
+            assert fmu.set(dict(zip(knowns, (*p, *u), strict=False))) == OK, fmu.log
+            at = np.concatenate([p, u, x])
+            J = np.array(jacobian(at))
+            # Changes are of the inputs' own sizes, rounding that of the largest of an output's elements.
+            size = np.maximum(np.abs(at), 1.0)
+            share = np.zeros(J.shape)
+            for rows in groups(tuple(unknowns)):
+                share[rows] = np.abs(J[rows] * size).max(axis=0)
+            seeds, weights = rng.normal(size=len(knowns)) * size, rng.normal(size=len(unknowns))
+            difference = fmu.directional(unknowns, knowns, seeds) - J @ seeds
+            assert (np.abs(difference) <= CHAIN_ULPS * U * (share @ np.abs(seeds / size))).all()
+            difference = (fmu.adjoint(unknowns, knowns, weights) - J.T @ weights) * size
+            assert (np.abs(difference) <= CHAIN_ULPS * U * (share.T @ np.abs(weights))).all()
+            assert fmu.step(0.1) == OK, fmu.log
+
+
 EDGES = {
     "at rest": (ISS_DG, {}, (0.0, 0.0, 0.0)),
     "symmetric body": (body(pmi=(2.0, 2.0, 2.0)), {}, (0.1, 0.2, 0.3)),
@@ -582,7 +615,7 @@ def test_scene_without_inputs_has_empty_p_and_u(raw: dict[str, Any], law: str) -
     assert numbers(twin.outputs(twin.x_start, [], [])).shape == (len(twin.y_names),)
 
 
-# CasADi's own settings, and the example
+# CasADi's own settings
 
 
 @contextmanager
@@ -607,11 +640,3 @@ def test_composite_is_the_fmus_whatever_casadis_simplification() -> None:
         twin = Twin(scene(random_scene(7)))
     for m in flight(7):
         assert numbers(twin.composite(m.p)[2]).tolist() == m.y["inertia"].tolist()
-
-
-def test_example_in_the_docstring_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(Path(__file__).parents[2])
-    example = inspect.cleandoc(Twin.__doc__ or "").partition("Example:\n")[2]
-    names: dict[str, Any] = {"Twin": Twin, "load_scene": load_scene}
-    exec(textwrap.dedent(example), names)
-    assert numbers(names["x_next"]).shape == (7,)

@@ -105,6 +105,20 @@ def test_step_is_the_fmus(propagator, law):
         assert numbers(twin.outputs(end, u, p)).tolist() == y.tolist()
 
 
+@pytest.mark.parametrize("propagator", PROPAGATORS)
+def test_generated_c_of_a_step_is_the_fmus(propagator, tmp_path):
+    raw = assembly(propagator)
+    twin = Twin(scene(raw))
+    step = twin.generate(tmp_path, ["step"], derivatives=0)["step"]
+    assert step.class_name() == "External"
+    for x, u, p, h, end, _ in flight(raw, twin, torque_of(propagator), steps_of(propagator)):
+        found = numbers(step(x, u, p, h))
+        if propagator in ("rk4", "dop853"):
+            assert found.tolist() == end.tolist()
+        else:
+            assert_same(found, end, float(h[0]))
+
+
 def test_outputs_show_principal_axes_and_leave_the_estimate_out():
     twin = Twin(scene(assembly("exact")))
     assert "error_estimate" not in twin.y_names

@@ -1,0 +1,1 @@
+"""What the twin offers for control: checked functions, errors of attitude, linear models, generated C."""
