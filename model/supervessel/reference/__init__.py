@@ -1,0 +1,64 @@
+"""The model in numpy, written for reading: a second opinion that shares no code with the symbolic one.
+
+Everything takes and returns plain arrays in SI units; `values` overrides inputs by the names that the FMU
+gives them. The body axes are those of the root vessel.
+"""
+
+from supervessel.reference.assembly import (
+    Composite,
+    Motion,
+    Points,
+    closed_docks,
+    composite,
+    internal_momentum,
+    joined,
+    motions,
+    points,
+    port_axes,
+    poses,
+    sample_points,
+)
+from supervessel.reference.changes import at_contact, change
+from supervessel.reference.rotation import (
+    angular_acceleration,
+    angular_momentum,
+    angular_velocity,
+    attitude_dot,
+    external_torque,
+    law_tensor,
+    momentum_ode,
+    net_force,
+    ode,
+    quaternion,
+    rotation_matrix,
+    vessel_outputs,
+)
+
+__all__ = [
+    "Composite",
+    "Motion",
+    "Points",
+    "angular_acceleration",
+    "angular_momentum",
+    "angular_velocity",
+    "at_contact",
+    "attitude_dot",
+    "change",
+    "closed_docks",
+    "composite",
+    "external_torque",
+    "internal_momentum",
+    "joined",
+    "law_tensor",
+    "momentum_ode",
+    "motions",
+    "net_force",
+    "ode",
+    "points",
+    "port_axes",
+    "poses",
+    "quaternion",
+    "rotation_matrix",
+    "sample_points",
+    "vessel_outputs",
+]

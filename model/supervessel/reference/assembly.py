@@ -1,0 +1,250 @@
+"""What is joined to the root, point by point: where vessels are and move, mass, inertia, internal momentum.
+
+The composite is summed as the technical note does, six points a vessel, products included.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supervessel.scene import ORIGIN, Dock, Scene
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Where a vessel is relative to the root and how it moves there, all in the root vessel's axes.
+
+    rotation : R_root_vessel, (3, 3)
+    origin   : (3,) [m], of the vessel's axes
+    rate     : (3,) [rad/s], angular velocity relative to the root
+    velocity : (3,) [m/s], of the origin relative to the root
+    """
+
+    rotation: Array
+    origin: Array
+    rate: Array
+    velocity: Array
+
+    def carry(self, positions_vessel: Array) -> tuple[Array, Array]:
+        """Returns positions [m] and velocities [m/s], root axes, of points of the vessel, (3,) or (n, 3)."""
+        arms = positions_vessel @ self.rotation.T
+        return self.origin + arms, self.velocity + np.cross(self.rate, arms)
+
+
+@dataclass(frozen=True)
+class Points:
+    """Point masses: masses (n,) [kg], positions (n, 3) [m], velocities (n, 3) [m/s], root vessel's axes."""
+
+    masses: Array
+    positions: Array
+    velocities: Array
+
+    @property
+    def barycentre(self) -> Array:
+        """Their barycentre, (3,) [m]."""
+        m, r = self.masses, self.positions
+        barycentre: Array = r[0] + m @ (r - r[0]) / m.sum()
+        return barycentre
+
+    @property
+    def momentum(self) -> Array:
+        """Their angular momentum about their barycentre, (3,) [N m s]."""
+        m, v = self.masses, self.velocities
+        v_rho = v - m @ v / m.sum()
+        momentum: Array = m @ np.cross(self.positions - self.barycentre, v_rho)
+        return momentum
+
+
+@dataclass(frozen=True)
+class Composite:
+    """Mass distribution of an assembly.
+
+    mass       : [kg]
+    barycentre : (3,) [m], root vessel's axes, from its origin
+    inertia    : (3, 3) [kg m2], about the barycentre, root vessel's axes
+    """
+
+    mass: float
+    barycentre: Array
+    inertia: Array
+
+    @property
+    def pmi(self) -> Array:
+        """Mass-normalised moments, (3,) [m2]: the diagonal of the inertia tensor over mass."""
+        return np.diag(self.inertia) / self.mass
+
+
+def sample_points(pmi: ArrayLike, convention: str = "rigid_body") -> Array:
+    """Returns the six points, (6, 3) [m], whose equal masses have the given moments.
+
+    pmi : (3,) [m2], mass-normalised moments along the axes
+    A square that is negative within rounding (a rod or a plate on the triangle's edge) counts as zero; by the
+    convention "orbiter" the absolute value of any square is taken.
+    Source: [CV] eqs. (3-7), (12).
+    """
+    k1, k2, k3 = np.asarray(pmi, dtype=float)
+    squares = 1.5 * np.array([k2 + k3 - k1, k3 + k1 - k2, k1 + k2 - k3])
+    half = np.diag(np.sqrt(np.abs(squares) if convention == "orbiter" else np.maximum(squares, 0.0)))
+    return np.vstack([half, -half])
+
+
+def port_axes(direction: ArrayLike, alignment: ArrayLike) -> Array:
+    """Returns the orthonormal columns (d, a, d x a), (3, 3), of a port, vessel axes.
+
+    direction : (3,), kept but for its length
+    alignment : (3,), projected onto the plane across direction
+    Both of any length > 0, not parallel (not checked).
+    """
+    d = np.asarray(direction, dtype=float)
+    a = np.asarray(alignment, dtype=float)
+    d, a = d / np.abs(d).max(), a / np.abs(a).max()
+    d = d / np.linalg.norm(d)
+    b = np.cross(d, a)
+    b = b / np.linalg.norm(b)
+    return np.column_stack([d, np.cross(b, d), b])
+
+
+def closed_docks(scene: Scene, values: Mapping[str, float] | None = None) -> list[Dock]:
+    """Returns the docks that are closed: for ever, or as their inputs say.
+
+    Raises ValueError if two of them share a port, or if they join two vessels that are joined already.
+    """
+    closed: list[Dock] = []
+    part = {vessel: vessel for vessel in scene.vessels}
+    for dock in scene.docks:
+        if dock.name in scene.inputs.docked and not (values or {}).get(f"{dock.name}.docked", dock.docked):
+            continue
+        name = " - ".join(dock.ports)
+        for port in dock.ports:
+            if any(port in other.ports for other in closed):
+                raise ValueError(f"{name}: port {port} is docked already")
+        one, other = (part[port.partition(".")[0]] for port in dock.ports)
+        if one == other:
+            raise ValueError(f"{name}: its vessels are joined already")
+        part = {vessel: one if p == other else p for vessel, p in part.items()}
+        closed.append(dock)
+    return closed
+
+
+def motions(scene: Scene, values: Mapping[str, float] | None = None) -> dict[str, Motion]:
+    """Returns how each vessel that closed docks join to the root is placed and moves; the root first.
+
+    Ports are mated face to face with their alignments together: R d_B = -d_A, R a_B = a_A. A port that moves
+    takes its mate along.
+    Source: [CV] eqs. (8), (9).
+    """
+    at_rest = np.zeros(3)
+    placed = {scene.root: Motion(np.eye(3), at_rest, at_rest, at_rest)}
+    docks = closed_docks(scene, values)
+    for _ in scene.vessels:
+        for dock in docks:
+            for here, there in (dock.ports, dock.ports[::-1]):
+                parent, child = here.partition(".")[0], there.partition(".")[0]
+                if parent in placed and child not in placed:
+                    placed[child] = _mated(
+                        placed[parent], _port(scene, here, values), _port(scene, there, values)
+                    )
+    return placed
+
+
+def poses(scene: Scene, values: Mapping[str, float] | None = None) -> dict[str, tuple[Array, Array]]:
+    """Returns R_root_vessel, (3, 3), and origin, (3,) [m], root axes, of each vessel joined to the root."""
+    return {vessel: (motion.rotation, motion.origin) for vessel, motion in motions(scene, values).items()}
+
+
+@dataclass(frozen=True)
+class _MovingPort:
+    """A port in its vessel's axes: position (3,) [m], axes (3, 3), velocity (3,) [m/s], rate (3,) [rad/s]."""
+
+    position: Array
+    axes: Array
+    velocity: Array
+    rate: Array
+
+
+def _port(scene: Scene, name: str, values: Mapping[str, float] | None) -> _MovingPort:
+    port = scene.port(name)
+    direction = vector(f"{name}.direction", port.direction, values)
+    return _MovingPort(
+        vector(f"{name}.position", port.position, values),
+        port_axes(direction, vector(f"{name}.alignment", port.alignment, values)),
+        vector(f"{name}.velocity", ORIGIN, values),
+        vector(f"{name}.rate", ORIGIN, values),
+    )
+
+
+def _mated(parent: Motion, here: _MovingPort, there: _MovingPort) -> Motion:
+    """Returns the motion of the vessel whose port `there` is mated with the port `here` of a parent.
+
+    The child turns at w_here - R w_there relative to the parent: R = F A^T, F being the axes of `here` turned
+    to face, A those of `there`.
+    """
+    facing = here.axes * [-1.0, 1.0, -1.0]
+    R_root_child = parent.rotation @ facing @ there.axes.T
+    face, face_velocity = parent.carry(here.position)
+    face_velocity = face_velocity + parent.rotation @ here.velocity - R_root_child @ there.velocity
+    rate = parent.rate + parent.rotation @ here.rate - R_root_child @ there.rate
+    arm = R_root_child @ there.position
+    return Motion(R_root_child, face - arm, rate, face_velocity - np.cross(rate, arm))
+
+
+def vector(group: str, start: ArrayLike, values: Mapping[str, float] | None) -> Array:
+    """Returns the three elements of an input, (3,), from `values` or, where it lacks them, from `start`."""
+    numbers = np.array(start, dtype=float)
+    for i in range(3):
+        numbers[i] = (values or {}).get(f"{group}[{i + 1}]", numbers[i])
+    return numbers
+
+
+def points(scene: Scene, values: Mapping[str, float] | None = None) -> dict[str, Points]:
+    """Returns the six points of each vessel joined to the root, the root's first.
+
+    A vessel given by a full tensor has its points on its own principal axes.
+    """
+    found = {}
+    for name, motion in motions(scene, values).items():
+        vessel = scene.vessels[name]
+        if vessel.pmi is not None:
+            own = sample_points(vector(f"{name}.pmi", vessel.pmi, values), scene.convention)
+        else:
+            moments, axes = np.linalg.eigh(np.array(vessel.specific_inertia))
+            own = sample_points(moments) @ axes.T
+        positions, velocities = motion.carry(np.array(vessel.centre_of_mass) + own)
+        masses = np.full(6, (values or {}).get(f"{name}.mass", vessel.mass) / 6.0)
+        found[name] = Points(masses, positions, velocities)
+    return found
+
+
+def joined(parts: Iterable[Points]) -> Points:
+    """Returns the points of several vessels as one set."""
+    lists = [(part.masses, part.positions, part.velocities) for part in parts]
+    masses, positions, velocities = (np.concatenate(arrays) for arrays in zip(*lists, strict=True))
+    return Points(masses, positions, velocities)
+
+
+def composite(scene: Scene, values: Mapping[str, float] | None = None) -> Composite:
+    """Returns the mass distribution of what is joined to the root, summed over six points a vessel.
+
+    values : inputs by the FMU's names that differ from the scene's, `{"DG.mass": 12000.0}`
+    Source: [CV] eqs. (10), (11), with the products of inertia that the note leaves out; by the convention
+    "orbiter" without.
+    """
+    whole = joined(points(scene, values).values())
+    m, rho = whole.masses, whole.positions - whole.barycentre
+    second_moments = (m[:, None] * rho).T @ rho
+    inertia = np.trace(second_moments) * np.eye(3) - second_moments
+    if scene.convention == "orbiter":
+        inertia = np.diag(np.diag(inertia))
+    return Composite(float(m.sum()), whole.barycentre, inertia)
+
+
+def internal_momentum(scene: Scene, values: Mapping[str, float] | None = None) -> Array:
+    """Returns the angular momentum of parts that move relative to the root, (3,) [N m s].
+
+    About the barycentre, root vessel's axes, which count as at rest: h = sum m rho x rho'.
+    """
+    return joined(points(scene, values).values()).momentum

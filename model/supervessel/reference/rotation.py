@@ -1,0 +1,196 @@
+"""How the body turns: what acts on it, rotation laws, rates of its state; how its vessels turn with it."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from supervessel.reference.assembly import (
+    Array,
+    composite,
+    internal_momentum,
+    joined,
+    motions,
+    points,
+    vector,
+)
+from supervessel.scene import ORIGIN, VESSEL_OUTPUT_NAMES, Scene
+
+
+def rotation_matrix(attitude: ArrayLike) -> Array:
+    """Returns R_inertial_body, (3, 3), of the unit quaternion `attitude`, (4,), scalar first."""
+    w, x, y, z = np.asarray(attitude, dtype=float)
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    rotation: Array = np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
+    return rotation
+
+
+def attitude_dot(attitude: ArrayLike, angular_velocity: ArrayLike) -> Array:
+    """Returns the rate of the attitude quaternion, (4,) [1/s]: half the product q * (0, omega).
+
+    attitude         : (4,), unit, scalar first, body to inertial
+    angular_velocity : (3,) [rad/s], body axes
+    """
+    q, omega = np.asarray(attitude, dtype=float), np.asarray(angular_velocity, dtype=float)
+    return 0.5 * np.concatenate([[-q[1:] @ omega], q[0] * omega + np.cross(q[1:], omega)])
+
+
+def quaternion(rotation: ArrayLike) -> Array:
+    """Returns the unit quaternion, (4,), scalar first and not negative, of a rotation matrix, (3, 3).
+
+    The inverse of `rotation_matrix`: w, x, y, z times each other are linear in the matrix's elements, and the
+    quaternion is the axis that the matrix of these products has.
+    """
+    R = np.asarray(rotation, dtype=float)
+    twist = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    products = np.empty((4, 4))
+    products[0, 0], products[0, 1:], products[1:, 0] = np.trace(R), twist, twist
+    products[1:, 1:] = R + R.T - np.trace(R) * np.eye(3)
+    axis: Array = np.linalg.eigh(products)[1][:, 3]
+    return axis if axis[0] >= 0.0 else -axis
+
+
+def law_tensor(law: str, inertia: ArrayLike) -> Array:
+    """Returns the part of an inertia tensor that a rotation law uses, (3, 3): all of it or its diagonal."""
+    J = np.asarray(inertia, dtype=float)
+    return np.diag(np.diag(J)) if law in ("principal", "decoupled") else J
+
+
+def angular_acceleration(
+    law: str,
+    inertia: ArrayLike,
+    angular_velocity: ArrayLike,
+    torque: ArrayLike,
+    internal_momentum: ArrayLike = ORIGIN,
+) -> Array:
+    """Returns the angular acceleration, (3,) [rad/s2], body axes, under a rotation law.
+
+    law               : "none", "decoupled", "principal" or "tensor"
+    inertia           : (3, 3) [kg m2], about the barycentre, body axes
+    angular_velocity  : (3,) [rad/s], body axes
+    torque            : (3,) [N m], about the barycentre, body axes
+    internal_momentum : (3,) [N m s], about the barycentre, body axes, of parts that move at steady rates
+    Source: [CV] eq. (1) for "tensor", eq. (2) for "principal"; "decoupled" leaves out the gyroscopic
+    term, "none" keeps the angular velocity.
+    """
+    J = law_tensor(law, inertia)
+    omega, torque = np.asarray(angular_velocity, dtype=float), np.asarray(torque, dtype=float)
+    if law == "none":
+        return np.zeros(3)
+    if law == "decoupled":
+        return torque / np.diag(J)
+    if law not in ("principal", "tensor"):
+        raise ValueError(f'law = "{law}": must be one of none, decoupled, principal, tensor')
+    momentum = J @ omega + np.asarray(internal_momentum, dtype=float)
+    acceleration: Array = np.linalg.solve(J, torque - np.cross(omega, momentum))
+    return acceleration
+
+
+def external_torque(scene: Scene, values: Mapping[str, float] | None = None) -> Array:
+    """Returns the torque on what is joined to the root, (3,) [N m], about its barycentre, body axes.
+
+    The torque input, the moments of forces at their points, and torques on vessels.
+    """
+    torque, barycentre = vector("torque", ORIGIN, values), composite(scene, values).barycentre
+    for vessel, motion in motions(scene, values).items():
+        torque = torque + motion.rotation @ vector(f"{vessel}.torque", ORIGIN, values)
+        for point, where in scene.vessels[vessel].points.items():
+            position, _ = motion.carry(np.array(where.position))
+            force = motion.rotation @ vector(f"{vessel}.{point}.force", ORIGIN, values)
+            torque = torque + np.cross(position - barycentre, force)
+    return torque
+
+
+def net_force(scene: Scene, values: Mapping[str, float] | None = None) -> Array:
+    """Returns the sum of the forces on what is joined to the root, (3,) [N], body axes."""
+    force = np.zeros(3)
+    for vessel, motion in motions(scene, values).items():
+        for point in scene.vessels[vessel].points:
+            force = force + motion.rotation @ vector(f"{vessel}.{point}.force", ORIGIN, values)
+    return force
+
+
+def ode(
+    scene: Scene,
+    state: ArrayLike,
+    torque: ArrayLike | None = None,
+    values: Mapping[str, float] | None = None,
+) -> Array:
+    """Returns the rate of the state (attitude, angular velocity), (7,), of a scene under its own law.
+
+    torque : (3,) [N m], all that acts from outside, about the barycentre; by default what `values` say
+    Inputs are steady: between changes.
+    """
+    state = np.asarray(state, dtype=float)
+    acceleration = angular_acceleration(
+        scene.rotation.law,
+        composite(scene, values).inertia,
+        state[4:],
+        external_torque(scene, values) if torque is None else torque,
+        internal_momentum(scene, values),
+    )
+    return np.concatenate([attitude_dot(state[:4], state[4:]), acceleration])
+
+
+def angular_momentum(
+    scene: Scene, angular_velocity: ArrayLike, values: Mapping[str, float] | None = None
+) -> Array:
+    """Returns H = J omega + h, (3,) [N m s], about the barycentre, body axes, J being the law's tensor.
+
+    angular_velocity : (3,) [rad/s], body axes
+    """
+    J = law_tensor(scene.rotation.law, composite(scene, values).inertia)
+    momentum: Array = J @ np.asarray(angular_velocity, dtype=float) + internal_momentum(scene, values)
+    return momentum
+
+
+def angular_velocity(scene: Scene, momentum: ArrayLike, values: Mapping[str, float] | None = None) -> Array:
+    """Returns omega = J^-1 (H - h), (3,) [rad/s], body axes, of a momentum H, (3,) [N m s], body axes."""
+    J = law_tensor(scene.rotation.law, composite(scene, values).inertia)
+    excess: Array = np.asarray(momentum, dtype=float) - internal_momentum(scene, values)
+    return np.asarray(np.linalg.solve(J, excess), dtype=float)
+
+
+def momentum_ode(scene: Scene, state: ArrayLike, values: Mapping[str, float] | None = None) -> Array:
+    """Returns the rate of the state (attitude, angular momentum in body axes), (7,), under the scene's law.
+
+    H' = M - omega x H; without the gyroscopic term under "decoupled". Right however the inputs move.
+    """
+    state = np.asarray(state, dtype=float)
+    omega = angular_velocity(scene, state[4:], values)
+    momentum_dot = external_torque(scene, values)
+    if scene.rotation.law != "decoupled":
+        momentum_dot = momentum_dot - np.cross(omega, state[4:])
+    return np.concatenate([attitude_dot(state[:4], omega), momentum_dot])
+
+
+def vessel_outputs(
+    scene: Scene, state: ArrayLike, values: Mapping[str, float] | None = None
+) -> dict[str, Array]:
+    """Returns the outputs of each vessel, "vessel.output"; all zero for one that is not joined to the root.
+
+    state : (attitude, angular velocity), (7,)
+    """
+    state = np.asarray(state, dtype=float)
+    omega, R_inertial_body = state[4:], rotation_matrix(state[:4])
+    found, own = motions(scene, values), points(scene, values)
+    whole = joined(own.values())
+    drift = whole.masses @ whole.velocities / whole.masses.sum()
+    outputs: dict[str, Array] = {}
+    for vessel, table in scene.vessels.items():
+        outputs |= {
+            f"{vessel}.{name}": np.zeros(4 if name == "attitude" else 3) for name in VESSEL_OUTPUT_NAMES
+        }
+        if vessel not in found:
+            continue
+        motion, part = found[vessel], own[vessel]
+        rho = part.positions - whole.barycentre
+        v = np.cross(omega, rho) + part.velocities - drift
+        outputs |= {
+            f"{vessel}.origin": motion.origin - whole.barycentre,
+            f"{vessel}.centre_of_mass": motion.carry(np.array(table.centre_of_mass))[0] - whole.barycentre,
+            f"{vessel}.attitude": quaternion(motion.rotation),
+            f"{vessel}.angular_velocity": motion.rotation.T @ (omega + motion.rate),
+            f"{vessel}.angular_momentum": R_inertial_body @ (part.masses @ np.cross(rho, v)),
+        }
+    return outputs

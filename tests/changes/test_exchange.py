@@ -1,0 +1,253 @@
+"""Model exchange while inputs change: in steps, all the time, and what is refused."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
+from scipy.integrate import solve_ivp
+
+from changes.histories import ByEvents, ByExchange, ByFmu, Values, elements, start_values
+from supervessel import reference
+from support import DISCARD, EPS, ERROR, OK, Instance, scene, variant
+
+# A tug with a tank on an arm that an importer may drive.
+TUG: dict[str, Any] = {
+    "name": "tug",
+    "root": "tug",
+    "vessels": {
+        "tug": {
+            "mass": 900.0,
+            "pmi": [2.0, 3.0, 4.0],
+            "ports": {
+                "arm": {"position": [3.0, 0.5, 0.0], "direction": [1, 0, 0], "alignment": [0, 1, 0]},
+                "top": {"position": [0.0, 0.0, 2.0], "direction": [0, 0, 1], "alignment": [0, 1, 0]},
+            },
+        },
+        "tank": {
+            "mass": 400.0,
+            "pmi": [0.5, 0.75, 1.0],
+            "ports": {
+                "end": {"position": [1.0, 0.0, 0.2], "direction": [1, 0, 0], "alignment": [0, 1, 0]},
+                "far": {"position": [-1.0, 0.0, 0.0], "direction": [-1, 0, 0], "alignment": [0, 1, 0]},
+            },
+        },
+    },
+    "docks": [
+        {"ports": ["tug.arm", "tank.end"], "name": "held"},
+        {"ports": ["tug.top", "tank.far"], "name": "stowed", "docked": False},
+    ],
+    "inputs": {"mass": ["tank"], "pose": ["tug.arm"], "docked": ["held", "stowed"], "torque": True},
+    "rotation": {
+        "propagator": "dop853",
+        "tolerance": 1e-12,
+        "mass_change": "momentum",
+        "angular_velocity": [0.2, -0.3, 0.1],
+        "attitude": [3, 1, -2, 5],
+    },
+    "outputs": {"names": ["mass", "inertia", "angular_velocity", "attitude", "angular_momentum"]},
+}
+MIXED = variant(TUG, {"name": "mixed", "rotation.mass_change": "rate"})
+STEADY = variant(TUG, {"name": "steady", "rotation.mass_change": "rate", "rotation.pose_change": "rate"})
+
+TORQUE = elements("torque", (30.0, -20.0, 10.0))
+DURATION = 4.0  # s
+FLIGHT_ERROR = 1e-10
+"""Of DOP853 at rtol = 1e-13 on both sides, over a radian."""
+
+
+def drawn_in(time: float) -> Values:
+    """Returns inputs that move all the time: the tank is drawn in, turned and filled."""
+    share = time / DURATION
+    pose = elements("tug.arm.position", (3.0 - share, 0.5 + share, 0.4 * np.sin(3.0 * share)))
+    pose |= elements("tug.arm.direction", (1.0, 0.3 * share, 0.0))
+    return pose | TORQUE | {"tank.mass": 400.0 + 200.0 * share**2}
+
+
+def truth(raw: dict[str, Any], by_momentum: bool) -> np.ndarray:
+    """Returns attitude and angular velocity after DURATION by SciPy on the reference, (7,)."""
+    flown = scene(raw)
+    start, omega = np.array(flown.rotation.attitude), np.array(flown.rotation.angular_velocity)
+    kept = reference.angular_momentum(flown, omega, drawn_in(0.0)) if by_momentum else omega
+
+    def rate(t: float, y: np.ndarray) -> np.ndarray:
+        if by_momentum:
+            return reference.momentum_ode(flown, y, drawn_in(t))
+        return reference.ode(flown, y, None, drawn_in(t))
+
+    y0 = np.concatenate([start, kept])
+    settings = {"rtol": 1e-13, "atol": 1e-15 * np.abs(y0).max()}
+    y = solve_ivp(rate, (0.0, DURATION), y0, "DOP853", **settings).y[:, -1]
+    omega = reference.angular_velocity(flown, y[4:], drawn_in(DURATION)) if by_momentum else y[4:]
+    return np.concatenate([y[:4] / np.linalg.norm(y[:4]), omega])
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize(("raw", "by_momentum"), [(TUG, True), (STEADY, False)], ids=["momentum", "rate"])
+def test_inputs_that_move_all_the_time_need_no_rates(raw, by_momentum, fmi):
+    driver = ByExchange(raw, fmi)
+    driver.fly(DURATION, drawn_in)
+    found = np.concatenate([driver.attitude, driver.angular_velocity])
+    assert np.abs(found - truth(raw, by_momentum)).max() <= FLIGHT_ERROR
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_momentum_is_a_state_where_every_change_keeps_it(fmi):
+    names = [v.name for v in Instance(TUG, fmi).description.modelVariables if v.name.startswith("state.")]
+    assert names[4:] == [f"state.angular_momentum[{i}]" for i in (1, 2, 3)]
+    names = [v.name for v in Instance(MIXED, fmi).description.modelVariables if v.name.startswith("state.")]
+    assert names[4:] == [f"state.angular_velocity[{i}]" for i in (1, 2, 3)]
+
+
+# A dozen points, ten roundings each, and the condition of a tensor with moments 20 times apart.
+CHANGE_ERROR = 256 * EPS
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_inputs_that_step_in_continuous_time_change_the_rate_at_once(fmi):
+    driver = ByExchange(TUG, fmi)
+    driver.rates(0.0, driver.states, drawn_in(DURATION))
+    omega = np.array(TUG["rotation"]["angular_velocity"])
+    expected = reference.change(scene(TUG), omega, {}, drawn_in(DURATION))
+    assert np.abs(driver.angular_velocity - expected).max() <= CHANGE_ERROR * np.abs(expected).max()
+    driver.rates(0.0, driver.states, drawn_in(0.0))
+    assert np.abs(driver.angular_velocity - omega).max() <= CHANGE_ERROR * np.abs(omega).max()
+
+
+EVENTS: list[Values] = [
+    drawn_in(DURATION / 2),
+    drawn_in(DURATION)
+    | {"held.docked": 0.0, "stowed.docked": 1.0}
+    | elements("stowed.velocity", (0.1, -0.2, 0.3))
+    | elements("stowed.rate", (0.2, 0.1, -0.1)),
+    {"stowed.docked": 0.0},
+]
+
+
+@pytest.mark.parametrize(("driver", "fmi"), [(ByExchange, 2), (ByExchange, 3), (ByEvents, 3)])
+@pytest.mark.parametrize("raw", [TUG, MIXED, STEADY], ids=["momentum", "mixed", "rate"])
+def test_events_at_one_instant_follow_each_other(raw, driver, fmi):
+    flying, flown = driver(raw, fmi), scene(raw)
+    values, omega = start_values(flown), np.array(flown.rotation.angular_velocity)
+    for inputs in EVENTS:
+        flying.set(inputs)
+        omega = reference.change(flown, omega, values, values | inputs)
+        values |= inputs
+        # Three changes, each with its own rounding.
+        assert np.abs(flying.angular_velocity - omega).max() <= 3 * CHANGE_ERROR * np.abs(omega).max()
+
+
+def test_changes_between_two_steps_are_one_change():
+    driver, flown = ByFmu(MIXED), scene(MIXED)
+    start = start_values(flown)
+    values = dict(start)
+    for inputs in EVENTS:
+        driver.set(inputs)
+        values |= inputs
+        omega = reference.change(flown, flown.rotation.angular_velocity, start, values)
+        assert np.abs(driver.angular_velocity - omega).max() <= CHANGE_ERROR * np.abs(omega).max()
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("raw", [TUG, MIXED], ids=["momentum", "rate"])
+def test_an_event_says_whether_it_changed_the_states(raw, fmi):
+    driver = ByExchange(raw, fmi)
+    fmu = driver.instance.fmu
+    for inputs, changed in (({"held.docked": 0.0}, raw is TUG), (TORQUE, False)):
+        before = driver.states
+        assert driver.instance._status(fmu.enterEventMode) == OK
+        assert driver.instance.set(inputs) == OK
+        info = (fmu.updateDiscreteStates if fmi == 3 else fmu.newDiscreteStates)()
+        assert bool(info[3]) is changed
+        assert driver.instance._status(fmu.enterContinuousTimeMode) == OK
+        assert (driver.states.tolist() != before.tolist()) is changed
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_mixture_refuses_moving_poses_in_continuous_time_and_keeps_its_state(fmi):
+    driver = ByExchange(MIXED, fmi)
+    states = driver.states.tolist()
+    moved = elements("tug.arm.position", (2.5, 0.5, 0.0))
+    assert driver.instance.set(moved) == OK
+    with pytest.raises(FMICallException):
+        driver.rates(0.0, driver.states)
+    assert (
+        "tug.arm.position[1] = 2.5 m: changed from 3 in continuous-time mode"
+        in driver.instance.messages()[-1]
+    )
+    assert driver.states.tolist() == states
+    assert driver.instance.set(elements("tug.arm.position", (3.0, 0.5, 0.0))) == OK
+    assert np.isfinite(driver.rates(0.0, driver.states)).all()
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_mixture_takes_moving_masses_in_continuous_time(fmi):
+    driver = ByExchange(MIXED, fmi)
+    driver.fly(DURATION, lambda t: {"tank.mass": 400.0 + 10.0 * t})
+    flown = scene(MIXED)
+    start = np.array([*flown.rotation.attitude, *flown.rotation.angular_velocity])
+
+    def rate(t: float, y: np.ndarray) -> np.ndarray:
+        return reference.ode(flown, y, None, {"tank.mass": 400.0 + 10.0 * t})
+
+    end = solve_ivp(rate, (0.0, DURATION), start, "DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
+    assert np.abs(driver.angular_velocity - end[4:]).max() <= FLIGHT_ERROR
+
+
+def test_docks_cannot_move_in_continuous_time():
+    driver = ByExchange(TUG)
+    assert driver.instance.set({"held.docked": 0.0}) == ERROR
+    assert "held.docked" in driver.instance.messages()[-1]
+
+
+# What co-simulation refuses
+
+
+REFUSALS: dict[str, tuple[Values, str]] = {
+    "occupied": ({"grip.docked": 1.0}, "grip.docked = true: port tug.arm is docked already"),
+    "loop": ({"stowed.docked": 1.0}, "stowed.docked = true: tug.top - tank.far closes a loop"),
+    "negative mass": ({"tank.mass": -1.0}, "tank.mass = -1 kg: must be >= 0"),
+    "parallel": (elements("tug.arm.direction", (0.0, 1.0, 0.0)), "tug.arm.direction"),
+}
+WITH_GRIP = variant(
+    TUG,
+    {
+        "docks": [*TUG["docks"], {"ports": ["tug.arm", "tank.far"], "name": "grip", "docked": False}],
+        "inputs.docked": ["held", "stowed", "grip"],
+    },
+)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("kind", REFUSALS)
+def test_a_change_that_cannot_be_is_refused_by_name_and_leaves_the_state(kind, fmi):
+    wrong, message = REFUSALS[kind]
+    driver = ByFmu(WITH_GRIP, fmi)
+    instance = driver.instance
+    driver.fly(0.5)
+    kept = [*driver.angular_velocity, *driver.attitude]
+    back = {name: instance.get(name) for name in wrong}
+    assert instance.set(wrong) == OK
+    assert instance.step(0.5) == DISCARD
+    assert message in instance.messages()[-1]
+    assert instance.set(back) == OK
+    assert [*driver.angular_velocity, *driver.attitude] == kept
+    driver.fly(0.5)
+    other = ByFmu(WITH_GRIP, fmi)
+    for _ in range(2):
+        other.fly(0.5)
+    assert driver.angular_velocity.tolist() == other.angular_velocity.tolist()
+    for flown in (driver, other):
+        flown.instance.free()
+
+
+def test_a_detached_ship_changes_nothing():
+    found = []
+    for inputs in ({}, {"tank.mass": 900.0}, elements("tug.arm.position", (9.0, 9.0, 9.0))):
+        driver = ByFmu(TUG)
+        driver.set({"held.docked": 0.0})
+        driver.fly(1.0)
+        driver.set(inputs | TORQUE)
+        driver.fly(1.0)
+        found.append([*driver.angular_velocity, *driver.attitude, *driver.instance.get("inertia")])
+    assert found[0] == found[1] == found[2]

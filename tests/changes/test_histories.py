@@ -1,0 +1,100 @@
+"""Momentum books over histories of burns, transfers, moves, dockings and undockings, up to 20 vessels."""
+
+from typing import Any
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+
+from changes.histories import (
+    EVENTS,
+    FLIGHT_ERROR,
+    ByExchange,
+    ByFmu,
+    ByReference,
+    ByTwin,
+    Driver,
+    assembly,
+    books,
+    flight,
+    happening,
+    start_values,
+)
+from supervessel import reference
+from support import EPS, scene
+
+U = EPS / 2
+BOOKS = 64 * U
+"""Of the sum of the magnitudes of all terms: what rounding may leave open."""
+
+HISTORIES = st.lists(
+    st.tuples(st.lists(st.sampled_from(sorted(EVENTS)), min_size=1, max_size=3), st.integers(0, 2**32 - 1)),
+    min_size=1,
+    max_size=20,
+)
+KEPT = [("rate", "momentum"), ("momentum", "momentum")]
+
+
+def follow(raw: dict[str, Any], driver: Driver, history: list[tuple[list[str], int]]) -> None:
+    """Flies a history; asserts that the books close over every event and every flight."""
+    flown = scene(raw)
+    values = start_values(flown)
+    for kinds, seed in history:
+        after = values | happening(flown, values, kinds, seed)
+        old, attitude = driver.angular_velocity, driver.attitude
+        driver.set({name: x for name, x in after.items() if values.get(name) != x})
+        new = driver.angular_velocity
+        missing, size = books(flown, values, after, old, new)
+        assert missing <= BOOKS * size, (kinds, seed, missing / size / U)
+        assert driver.attitude.tolist() == attitude.tolist()
+        values = after
+        driver.fly(0.5)
+        end, impulse = flight(flown, attitude, new, values, 0.5)
+        momenta = [
+            reference.rotation_matrix(q / np.linalg.norm(q))
+            @ reference.angular_momentum(flown, omega, values)
+            for q, omega in ((attitude, new), (driver.attitude, driver.angular_velocity))
+        ]
+        scale = size + np.abs(impulse).max()
+        assert np.abs(momenta[1] - momenta[0] - impulse).max() <= FLIGHT_ERROR * scale
+        assert np.abs(driver.angular_velocity - end[4:]).max() <= FLIGHT_ERROR * (1.0 + np.abs(end[4:]).max())
+
+
+@pytest.mark.parametrize("kept", KEPT, ids=" ".join)
+@settings(deadline=None, derandomize=True, max_examples=10, phases=(Phase.explicit, Phase.generate))
+@given(seed=st.integers(0, 10**6), count=st.integers(2, 20), history=HISTORIES)
+def test_books_of_the_reference_close(kept, seed, count, history):
+    raw = assembly(seed, count, mass_change=kept[0], pose_change=kept[1])
+    follow(raw, ByReference(raw), history)
+
+
+@pytest.mark.parametrize("count", [3, 20])
+@settings(deadline=None, derandomize=True, max_examples=10, phases=(Phase.explicit, Phase.generate))
+@given(history=HISTORIES)
+def test_books_of_the_fmu_close(count, history):
+    raw = assembly(count, count, mass_change="rate", pose_change="momentum")
+    driver = ByFmu(raw)
+    follow(raw, driver, history)
+    driver.instance.free()
+
+
+@pytest.mark.parametrize("driver", [ByFmu, ByExchange])
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("kept", KEPT, ids=" ".join)
+@settings(deadline=None, derandomize=True, max_examples=5, phases=(Phase.explicit, Phase.generate))
+@given(history=HISTORIES)
+def test_books_of_the_fmu_close_in_both_interfaces(kept, fmi, driver, history):
+    raw = assembly(3, 3, mass_change=kept[0], pose_change=kept[1])
+    flying = driver(raw, fmi)
+    follow(raw, flying, history)
+    flying.instance.free()
+
+
+@pytest.mark.parametrize("count", [3, 20])
+@pytest.mark.parametrize("kept", KEPT, ids=" ".join)
+@settings(deadline=None, derandomize=True, max_examples=5, phases=(Phase.explicit, Phase.generate))
+@given(history=HISTORIES)
+def test_books_of_the_twin_close(kept, count, history):
+    raw = assembly(count, count, mass_change=kept[0], pose_change=kept[1])
+    follow(raw, ByTwin(raw), history)
