@@ -413,10 +413,8 @@ def parts(flown: Scene, angular_velocity: Array, values: Mapping[str, float]) ->
         R, r = motion.rotation.astype(Long), motion.origin.astype(Long)
         turning = omega + motion.rate
         momentum = R @ (mass * pmi * (R.T @ turning))
-        # What rounds in a position or a velocity is a share of it, not of what two of them differ by.
-        spread = mass * length(r) * (length(motion.velocity) + length(omega) * length(r))
         velocity = motion.velocity + np.cross(omega, r)
-        found[name] = Part(mass, r, velocity, momentum, length(momentum) + spread)
+        found[name] = Part(mass, r, velocity, momentum, length(momentum))
     return found
 
 

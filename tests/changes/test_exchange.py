@@ -42,6 +42,7 @@ TUG: dict[str, Any] = {
         "propagator": "dop853",
         "tolerance": 1e-12,
         "mass_change": "momentum",
+        "pose_change": "momentum",
         "angular_velocity": [0.2, -0.3, 0.1],
         "attitude": [3, 1, -2, 5],
     },

@@ -95,7 +95,7 @@ def test_an_arm_on_a_closed_path_turns_the_base_as_two_bodies_do():
 
 
 def test_without_inputs_of_motion_the_base_does_not_turn():
-    still = variant(ROBOT, {"inputs.motion": []})
+    still = variant(ROBOT, {"inputs.motion": [], "rotation.pose_change": "momentum"})
     driver = ByExchange(still)
     driver.fly(
         DURATION, lambda t: {k: v for k, v in inputs(t).items() if "velocity" not in k and "rate" not in k}

@@ -648,7 +648,7 @@ def observed(
 
 
 def without_kept(found: Mapping[str, set[str]]) -> dict[str, set[str]]:
-    """Returns dependencies without those of the angular momentum on poses, which keep it: only rounding shows."""
+    """Returns dependencies without those of the angular momentum on poses: only rounding shows."""
     poses = tuple(f".{part}[{i}]" for part in ("position", "direction", "alignment") for i in (1, 2, 3))
     return {
         unknown: {

@@ -197,6 +197,12 @@ def test_poses_change_before_a_ship_docks() -> None:
     assert close(rate, [0.0, 0.0, REDUCED * apart * 0.3 / moments(apart=apart)[2]])
 
 
+def test_a_ship_leaves_before_masses_and_poses_change() -> None:
+    flown, omega = scene(variant(PAIR, {"rotation": MASSES["rotation"]})), (0.1, -0.2, 0.3)
+    after = FREE | DRAWN_IN | {"ship.mass": 400.0}
+    assert reference.change(flown, omega, JOINED, after).tolist() == list(omega)
+
+
 # Moving ports
 
 

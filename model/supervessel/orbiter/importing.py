@@ -61,13 +61,9 @@ def import_scenario(
     for dock in docks(found, names, said):
         problems.append(dock) if isinstance(dock, str) else mated.append(dock)
     classes = _classes(found, names, library, problems)
-    used = _used_ports(found, mated, classes, problems)
-    levels = {name: _levels(found.ships[name], problems) for name in names}
-    members = {}
-    for name, made in classes.items():
-        mass, full, origin = _masses(found.ships[name], made, levels[name], problems, notes)
-        ports = _usable_ports(found.ships[name], made, used[name], problems, notes)
-        members[name] = Member(found.ships[name], made, mass, full, origin, ports)
+    for name in (name for name in names if name not in classes):
+        _levels(found.ships[name], problems)  # what is wrong with them is told all the same
+    members = _members(found, mated, classes, problems, notes)
     key = _convention(members, convention, problems, notes)
     notes += _doubts(found, members)
     saved = {name: saved_motion(found.ships[name], problems) for name in names}
@@ -79,6 +75,25 @@ def import_scenario(
     _checked(final, start)
     sources = dict.fromkeys([found.path, *(member.of.mass_place.path for member in members.values())])
     return Imported(scene_text(final, start), tuple(map(str, final.notes)), tuple(sources))
+
+
+def _members(
+    found: Scenario,
+    mated: Sequence[Mention],
+    classes: Mapping[str, VesselClass],
+    problems: list[str],
+    notes: list[Note],
+) -> dict[str, Member]:
+    """Returns the ships of the assembly whose classes are known, by name."""
+    used = _used_ports(found, mated, classes, problems)
+    members = {}
+    for name, made in classes.items():
+        mass, full, origin = _masses(
+            found.ships[name], made, _levels(found.ships[name], problems), problems, notes
+        )
+        ports = _usable_ports(found.ships[name], made, used[name], problems, notes)
+        members[name] = Member(found.ships[name], made, mass, full, origin, ports)
+    return members
 
 
 def _read(path: Path, folders: Sequence[Path], table: Path | None) -> tuple[Scenario, Library]:
