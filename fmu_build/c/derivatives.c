@@ -65,13 +65,12 @@ static void project_attitude_start(Instance *instance, double v[4]) {
     for (size_t i = 0; i < 4; i++) v[i] = (v[i] - q[i] * along) / length;
 }
 
-/* Where the variation of a variable stands, or NULL: time changes nothing, nor does the motion at contact. Start parameters vary the state that
-   they become, the angular velocity's three before the attitude's four. */
+/* Where the variation of a variable stands, or NULL: time changes nothing. Start parameters vary the state that they
+   become, the angular velocity's three before the attitude's four. */
 static double *place(Variation *v, unsigned reference) {
     switch (VARIABLES[reference].role) {
         case ROLE_INPUT:
-            if (reference >= REFERENCE_TORQUE) return &v->inputs[INPUT_P_COUNT + reference - REFERENCE_TORQUE];
-            return reference < REFERENCE_CONTACT ? &v->inputs[reference - REFERENCE_P] : NULL;
+            return &v->inputs[reference - REFERENCE_P];
         case ROLE_PARAMETER:
             return reference < REFERENCE_ATTITUDE_START ? &v->x[4 + reference - REFERENCE_RATE_START]
                                                         : &v->x[reference - REFERENCE_ATTITUDE_START];
@@ -88,7 +87,7 @@ static void respond(Instance *instance) {
     instance_set_arguments(instance);
     instance->arg[0] = instance_states(instance);
     instance->arg[4] = v->x;
-    instance->arg[5] = v->inputs + INPUT_P_COUNT;
+    instance->arg[5] = v->inputs + INPUT_P_COUNT + INPUT_K_COUNT;
     instance->arg[6] = v->c;
     instance->res[0] = v->rate;
     instance->res[1] = v->y;
@@ -152,7 +151,7 @@ Status derivatives_adjoint(Instance *instance, const unsigned unknowns[], size_t
     instance->arg[4] = v->rate;
     instance->arg[5] = v->y;
     instance->res[0] = v->x;
-    instance->res[1] = v->inputs + INPUT_P_COUNT;
+    instance->res[1] = v->inputs + INPUT_P_COUNT + INPUT_K_COUNT;
     instance->res[2] = v->c;
     response_reverse(instance->arg, instance->res, instance->iw, instance->w, 0);
     for (size_t i = 0; i < STATE_COUNT && at_start; i++) v->x[i] += on_states[i];

@@ -146,11 +146,16 @@ static Status refuse_count(Instance *instance, const Progress *progress, double 
                            MOST_SUB_STEPS);
 }
 
+/* The size nearest to one whose difference from what remains is a double: times of sub-steps then add up exactly. */
+static double without_rest(const Progress *progress, double size) {
+    return progress->remaining - (progress->remaining - size);
+}
+
 /* Size of the next sub-step [s] by what is known before it. */
 static double planned_size(const Progress *progress) {
     const double size = progress->next_size;
     if (!(size < progress->remaining)) return progress->remaining;
-    return 2.0 * size > progress->remaining ? 0.5 * progress->remaining : size;
+    return 2.0 * size > progress->remaining ? 0.5 * progress->remaining : without_rest(progress, size);
 }
 
 /* Goes on to next, by a sub-step of that size with an error that is estimated. */
@@ -178,8 +183,9 @@ static double first_size(Instance *instance, const Progress *progress) {
 
 #if STEPS == STEPS_BY_SERIES
 
-/* Angle [rad] for which an error of the rate is taken to turn the body on: errors of many sub-steps nearly cancel. */
-static const double TURNED_ON = 6.0;
+/* An error of the rate turns the body on for what remains, but those of many sub-steps nearly cancel: one counts for
+   this angle [rad] and this share of what remains at most (measured in tests/stability/test_tolerances.py). */
+static const double TURNED_ON = 3.0, TURNED_ON_SHARE = 0.1;
 
 /* A sub-step may exceed by this factor the span that its series were made for. */
 static const double LONGEST_SHARE = 1.2;
@@ -212,18 +218,21 @@ static Status sub_step(Instance *instance, Progress *progress) {
         if (!(count <= MOST_SUB_STEPS)) return refuse_count(instance, progress, count);
         taylor_series(x, progress->acceleration, map, size, &series);
         const double speed = length_of(series.rates[0]) + length_of(series.rates[1]);
-        const double reach = larger(progress->remaining, speed > 0.0 ? 1.0 / speed : 0.0);
+        const double left = larger(progress->remaining, speed > 0.0 ? 1.0 / speed : 0.0);
+        const double reach = smaller(left, TURNED_ON / speed + TURNED_ON_SHARE * left);
         const double rounding = HALF_ULP * (1.0 + speed * reach);
         const double allowed = larger(SAFETY * instance->now.tolerance * (size / progress->h), rounding);
-        const double found = series.error[0] + series.error[1] * smaller(reach, TURNED_ON / speed);
+        const double found = series.error[0] + series.error[1] * reach;
         const double best = found > 0.0 ? pow(AIM * allowed / found, 1.0 / series.order) : 5.0;
-        double share = 1.0, next[STATE_COUNT];
-        if (!(found <= allowed)) share = best;
-        else if (2.0 * LONGEST_SHARE * size < progress->remaining) share = larger(1.0, smaller(best, LONGEST_SHARE));
+        double taken = size, next[STATE_COUNT];
+        if (!(found <= allowed)) taken = without_rest(progress, best * size);
+        else if (best > 1.0 && 2.0 * LONGEST_SHARE * size < progress->remaining)
+            taken = without_rest(progress, smaller(best, LONGEST_SHARE) * size);
+        const double share = taken / size;
         taylor_sum(&series, x, map, share, next);
         if (isfinite(found) && is_finite(next)) {
             const double error = share == 1.0 ? found : AIM * allowed * share;
-            go_on(instance, progress, next, share * size, error + HALF_ULP * (1.0 + speed * size));
+            go_on(instance, progress, next, taken, error + HALF_ULP * (1.0 + speed * size));
             progress->next_size = size * smaller(best, 5.0);
             return STATUS_OK;
         }

@@ -13,7 +13,9 @@ enum { WIDTH = 10 };
 #endif
 
 /* What the products take of a coefficient: seven of the turn or the rates, see _turn in taylor.py, then the rates. */
-typedef double Row[WIDTH];
+typedef struct {
+    double of[WIDTH];
+} Row;
 
 static double remainder_of(double before, double after) {
     return after / sqrt(before > 0.0 ? before : 1.0);
@@ -26,7 +28,7 @@ void add_products(const Row *one, const Row *other, int count, double sums[WIDTH
 void add_products(const Row *one, const Row *other, int count, double sums[WIDTH]) {
     double s[WIDTH] = {0.0};
     for (int j = 0; j < count; j++)
-        for (int i = 0; i < WIDTH; i++) s[i] += one[j][i] * other[-j][i];
+        for (int i = 0; i < WIDTH; i++) s[i] += one[j].of[i] * other[-j].of[i];
     for (int i = 0; i < WIDTH; i++) sums[i] = s[i];
 }
 
@@ -129,7 +131,7 @@ void taylor_series(const double x[7], const double acceleration[3], const double
 #else
         rate[0] = rate[1] = rate[2] = 0.0;
 #endif
-        if (k + 1 < order) spread(p, v, step, ones[k], others[k]);
+        if (k + 1 < order) spread(p, v, step, ones[k].of, others[k].of);
     }
     estimate(series);
 }

@@ -280,11 +280,8 @@ def _axes(scene: Scene, plan: Plan, inertia: ca.SX, products: ca.SX) -> tuple[di
     if plan.free != "never":
         parts["free"] = ca.vertcat(moments, ca.vec(axes))
     if in_series:
-        parts["series"] = ca.SX(0, 1)
-        if mapped:
-            parts["series"] = ca.vertcat(principal_products(moments), ca.vec(axes))
-        elif products.numel():
-            parts["series"] = ca.diag(products[:, :3])
+        own = ca.diag(products) if products.numel() and not mapped else ca.SX(0, 1)
+        parts["series"] = ca.vertcat(principal_products(moments), ca.vec(axes)) if mapped else own
     slices, end = {}, 0
     for name, part in parts.items():
         slices[name] = slice(end, end := end + part.numel())

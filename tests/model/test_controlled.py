@@ -133,8 +133,8 @@ SAFETY = {"dop853": 5.0, "taylor": 2.5}
 """Estimated errors allowed over the tolerance: they add up to a tenth or so of their sum (measured)."""
 
 
-TURNED_ON = 6.0
-"""Angle [rad] for which Taylor steps take an error of the rate to turn the body on."""
+TURNED_ON, TURNED_ON_SHARE = 3.0, 0.1
+"""Of a Taylor step's error of the rate: it counts for this angle [rad] and this share of the rest at most."""
 
 AIM, LONGEST_SHARE = 0.8, 1.2
 """Of the error allowed, and of the span that a series was made for, in a Taylor step."""
@@ -147,7 +147,7 @@ def controlled(
 
     The error at the end is to be `tolerance`: radians of attitude, and of angular velocity relative to it.
     An error of the rate turns the body on for what is left of the duration, the reach, but counts no less
-    than relative to the rate; that of a series for TURNED_ON at most. Each step may use up its share of the
+    than relative to the rate; that of a series for less, TURNED_ON. Each step may use up its share of the
     tolerance by time; where that is less than what a rounding of the state amounts to by the end,
     u (1 + rate reach), the latter. A series is summed up where it uses that up; others step again.
     """
@@ -166,9 +166,10 @@ def controlled(
         count += 1
         speed = max(float(np.linalg.norm(state[4:])), float(np.linalg.norm(end[4:])))
         reach = max(left, 1.0 / speed) if speed else left
+        if one.series and speed:
+            reach = min(reach, TURNED_ON / speed + TURNED_ON_SHARE * reach)
         allowed = max(safety * tolerance * h / duration, U * (1.0 + speed * reach))
-        counted = min(reach, TURNED_ON / speed) if one.series and speed else reach
-        measure = float(error[0] + error[1] * counted)
+        measure = float(error[0] + error[1] * reach)
         change = (allowed / measure) ** (1.0 / (one.power - 1)) if measure > 0.0 else 6.0
         change *= AIM ** (1.0 / (one.power - 1)) if one.series else 0.9
         change = min(max(change, 0.2), 5.0) if np.isfinite(measure) else 0.2

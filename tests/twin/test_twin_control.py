@@ -56,6 +56,7 @@ def numbers(value: Any) -> Array:
         (lambda t: t.step(x=t.x_start, hh=H), 'unknown argument "hh" (did you mean "h"?)'),
         (lambda t: t.step(t.x_start, h=H), "either all named or all in order"),
         (lambda t: t.step(x="start", h=H), "step: x = 'start': must be numbers or CasADi symbols"),
+        (lambda t: t.ode(x=t.x, u=[t.u[0], 0]), "ode: u holds 2 numbers: 3 numbers wanted"),
         (lambda t: t.step(x=np.full(7, np.nan), h=H), "must be finite"),
         (lambda t: t.ode(x=t.x_start, u=[0, 0, np.inf]), "must be finite"),
         (lambda t: t.step(x=[1, 1, 0, 0, 0, 0, 0], h=H), "the attitude in x has length 1.41421: must be 1"),
@@ -117,6 +118,14 @@ def test_arguments_left_out_are_no_torque_and_the_scenes_inputs(twin: Twin) -> N
     assert np.array(short).tolist() == whole.tolist()
 
 
+@pytest.mark.parametrize("kind", [ca.SX, ca.MX])
+def test_a_list_may_hold_symbols_among_numbers(twin: Twin, kind: Any) -> None:
+    torque = kind.sym("torque")
+    rate = twin.ode(x=twin.x_start, u=[0.0, torque, 5.0])["x_dot"]
+    found = numbers(ca.Function("rate", [torque], [rate])(7.0))
+    assert found.tolist() == numbers(twin.ode(twin.x_start, [0.0, 7.0, 5.0], twin.p_start)).tolist()
+
+
 def test_p_with_puts_values_where_their_names_stand(twin: Twin) -> None:
     p = twin.p_with({"DG.mass": 12000.0, "DG.nose.position": [1, 2, 3], "DG.pmi[2]": 20.0})
     changed = dict(zip(twin.p_names, p, strict=True))
@@ -143,7 +152,7 @@ def test_each_function_survives_saving(twin: Twin, name: str) -> None:
     again = ca.Function.deserialize(function.serialize())
     rng = np.random.default_rng(1)
     at = {"x": twin.x_start, "x_ref": twin.x_start, "p": twin.p_start, "u": TORQUE, "h": H}
-    at |= {"e": 0.1 * rng.normal(size=6), "acceleration_ref": rng.normal(size=3)}
+    at |= {"e": 0.1 * rng.normal(size=6), "acceleration_ref": rng.normal(size=3), "p_next": 1.01 * twin.p_start}
     arguments = [at[argument] for argument in function.name_in()]
     values = [numbers(v).tolist() for v in (again.call(arguments), function.call(arguments)) for v in v]
     assert values[: len(values) // 2] == values[len(values) // 2 :]

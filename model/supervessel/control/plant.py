@@ -179,9 +179,9 @@ class Plant:
         says; what docks brings its momentum along, moving as the inputs of motion at contact in p_next say.
 
         Example:
-            >>> moved = twin.p_with({"DG.nose.position": [0.0, -0.49, -12.0]})
+            >>> moved = twin.p_with({"DG.nose.position": [5.0, -0.49, -10.076]})
             >>> x_next = twin.change(twin.x_start, twin.p_start, moved)
-            >>> float(x_next[5]) < twin.x_start[5]  # the ship is farther out: the same momentum, a lower rate
+            >>> bool(x_next[5] < twin.x_start[5])  # the ship is farther out: the same momentum, a lower rate
             True
         """
         model, p_next = self._model, ca.SX.sym("p_next", self.p.numel())

@@ -113,7 +113,7 @@ def _product(rates: Coefficients, first: int, second: int) -> ca.SX:
 
 
 def _sum(terms: Coefficients) -> ca.SX:
-    """Returns the sum of a series of s^1, s^2, and so on; its even and odd powers, the smallest terms first."""
+    """Returns the sum of a series of s^1, s^2, and so on: even and odd powers apart, the smallest first."""
     columns = [ca.vertcat(*term) for term in terms]
     odd, even = (sum(reversed(columns[i::2]), ca.SX.zeros(len(terms[0]))) for i in (0, 1))
     return even + odd
