@@ -152,7 +152,11 @@ def test_each_function_survives_saving(twin: Twin, name: str) -> None:
     again = ca.Function.deserialize(function.serialize())
     rng = np.random.default_rng(1)
     at = {"x": twin.x_start, "x_ref": twin.x_start, "p": twin.p_start, "u": TORQUE, "h": H}
-    at |= {"e": 0.1 * rng.normal(size=6), "acceleration_ref": rng.normal(size=3), "p_next": 1.01 * twin.p_start}
+    at |= {
+        "e": 0.1 * rng.normal(size=6),
+        "acceleration_ref": rng.normal(size=3),
+        "p_next": 1.01 * twin.p_start,
+    }
     arguments = [at[argument] for argument in function.name_in()]
     values = [numbers(v).tolist() for v in (again.call(arguments), function.call(arguments)) for v in v]
     assert values[: len(values) // 2] == values[len(values) // 2 :]
