@@ -52,15 +52,16 @@ def generate(scene: Scene, fmi: int) -> tuple[dict[str, str], bytes]:
     """Returns what is particular to a scene: its C files by name, and modelDescription.xml."""
     model = equations(scene)
     entries = variable_table(scene, model)
+    changing = model.change is not None
     sources = {
         "model.c": model_source(model),
         "scene.h": scene_header(scene, model, entries),
-        "scene.c": scene_source(entries, token="") + change_tables(scene, model),
+        "scene.c": scene_source(entries, "", changing) + change_tables(scene, model),
     }
     names = source_file_names(sources, fmi)
     without_token = model_description(scene, entries, "", fmi, names)
     token = digest(*source_files(sources, fmi, scene.name).values(), without_token)
-    sources["scene.c"] = scene_source(entries, token) + change_tables(scene, model)
+    sources["scene.c"] = scene_source(entries, token, changing) + change_tables(scene, model)
     return sources, model_description(scene, entries, token, fmi, names)
 
 

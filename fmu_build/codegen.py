@@ -124,9 +124,12 @@ def _lines(form: str, values: Mapping[str, object]) -> str:
     return "\n".join(form.format(name, value) for name, value in values.items())
 
 
-def scene_source(entries: Sequence[Entry], token: str) -> str:
-    """Returns scene.c: the variable table with start values, and the token."""
-    needs = {entry.reference: _needs(entry) for entry in entries}
+def scene_source(entries: Sequence[Entry], token: str, changing: bool) -> str:
+    """Returns scene.c: the variable table with start values, and the token.
+
+    changing : whether a change of inputs makes the states other ones
+    """
+    needs = {entry.reference: _needs(entry, changing) for entry in entries}
     typed = any(entry.variable.boolean for entry in entries)
     rows = "\n".join(f"    {_row(entry, needs, typed)}," for entry in entries)
     return (
@@ -137,10 +140,12 @@ def scene_source(entries: Sequence[Entry], token: str) -> str:
     )
 
 
-def _needs(entry: Entry) -> frozenset[str]:
+def _needs(entry: Entry, changing: bool) -> frozenset[str]:
     """Returns what must be current before that which follows from a variable can be read."""
+    if entry.role == "state" and "attitude" in entry.variable.name:
+        return frozenset({"STATES", "ATTITUDE"})
     if entry.role == "state":
-        return frozenset({"STATES", "ATTITUDE"} if "attitude" in entry.variable.name else {"STATES"})
+        return frozenset({"STATES", "COMPOSITE"} if changing else {"STATES"})
     if isinstance(entry.variable, InputVariable) and entry.role == "input" and entry.variable.part == "shape":
         return frozenset({"COMPOSITE"})
     return frozenset()

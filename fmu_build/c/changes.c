@@ -5,6 +5,14 @@
 
 #include "model.h"
 
+#if DOCK_COUNT
+
+static const char *flag_name(const Dock *dock) {
+    return VARIABLES[REFERENCE_P + dock->flag].name;
+}
+
+#endif
+
 #if CHANGES
 
 static void copy_p(double to[], const double from[]) {
@@ -25,34 +33,76 @@ static bool take_over(double stage[], const double p[], unsigned kinds, bool clo
 
 #if MASSES_KEEP_MOMENTUM || POSES_KEEP_MOMENTUM
 
-/* Goes on from a stage with composite c to one where inputs of some kinds are as in p, keeping the momentum. */
-static Status keep(Instance *instance, double stage[], double c[], const double p[], unsigned kinds, double rate[3]) {
-    double next_c[COMPOSITE_COUNT], next[3];
-    if (!take_over(stage, p, kinds, false)) return STATUS_OK;
-    const Status status = composite_compute(instance, stage, next_c);
+/* Inputs on the way of a change, and their composite once it is asked for. */
+typedef struct {
+    double p[INPUT_P_COUNT], c[COMPOSITE_COUNT];
+    bool c_is_current;
+} Stage;
+
+/* Lets inputs of some kinds be as in p, docks open. */
+static bool move_stage(Stage *stage, const double p[], unsigned kinds) {
+    const bool changed = take_over(stage->p, p, kinds, false);
+    if (changed) stage->c_is_current = false;
+    return changed;
+}
+
+static Status weigh(Instance *instance, Stage *stage) {
+    const Status status = stage->c_is_current ? STATUS_OK : composite_between(instance, stage->p, stage->c);
+    stage->c_is_current = status == STATUS_OK;
+    return status;
+}
+
+/* Goes on from a stage to one where inputs of some kinds are as in p, keeping the momentum. */
+static Status keep(Instance *instance, Stage *stage, const double p[], unsigned kinds, double rate[3]) {
+    Stage next = *stage;
+    double changed[3];
+    if (!move_stage(&next, p, kinds)) return STATUS_OK;
+    Status status = weigh(instance, stage);
+    if (status == STATUS_OK) status = weigh(instance, &next);
     if (status != STATUS_OK) return status;
     instance->arg[0] = rate;
-    instance->arg[1] = c;
-    instance->arg[2] = next_c;
-    instance->res[0] = next;
+    instance->arg[1] = stage->c;
+    instance->arg[2] = next.c;
+    instance->res[0] = changed;
     keep_momentum(instance->arg, instance->res, instance->iw, instance->w, 0);
-    memcpy(rate, next, sizeof next);
-    memcpy(c, next_c, sizeof next_c);
+    memcpy(rate, changed, sizeof changed);
+    *stage = next;
     return STATUS_OK;
+}
+
+/* The angular velocity before docks close, after all else has changed to p. */
+static Status rate_kept(Instance *instance, const double p[], double rate[3]) {
+    Stage stage = {.c_is_current = true};
+    Status status = STATUS_OK;
+    copy_p(stage.p, instance->now.stepped_p);
+    memcpy(stage.c, instance->now.kept_c, sizeof stage.c);
+    move_stage(&stage, p, KIND_DOCKED);
+#if MASSES_KEEP_MOMENTUM
+    status = keep(instance, &stage, p, KIND_MASS, rate);
+#else
+    move_stage(&stage, p, KIND_MASS);
+#endif
+#if POSES_KEEP_MOMENTUM
+    if (status == STATUS_OK) status = keep(instance, &stage, p, KIND_POSE, rate);
+#endif
+    return status;
 }
 
 #endif
 
 #if DOCK_COUNT
 
+static bool closes(const Instance *instance, const Dock *dock, const double p[]) {
+    return dock->flag >= 0 && p[dock->flag] != 0.0 && instance->now.stepped_p[dock->flag] == 0.0;
+}
+
 /* Adds what the docks that close bring along; c is the composite with them closed. */
-static void dock(Instance *instance, const double stage[], const double p[], const double c[], double rate[3]) {
+static void dock(Instance *instance, const double p[], const double c[], double rate[3]) {
     double motion[INPUT_K_COUNT], momentum[3], next[3];
     memcpy(motion, &instance->now.values[REFERENCE_CONTACT], sizeof motion);
-    for (size_t i = 0; i < DOCK_COUNT; i++) {
-        const bool closes = DOCKS[i].flag >= 0 && p[DOCKS[i].flag] != 0.0 && stage[DOCKS[i].flag] == 0.0;
-        if (DOCKS[i].flag >= 0 && !closes) memset(&motion[DOCKS[i].motion], 0, 6 * sizeof(double));
-    }
+    for (size_t i = 0; i < DOCK_COUNT; i++)
+        if (DOCKS[i].flag >= 0 && !closes(instance, &DOCKS[i], p))
+            memset(&motion[DOCKS[i].motion], 0, 6 * sizeof(double));
     instance->arg[0] = p;
     instance->arg[1] = motion;
     instance->res[0] = momentum;
@@ -67,40 +117,35 @@ static void dock(Instance *instance, const double stage[], const double p[], con
 
 #endif
 
+/* Refuses a change that leaves such a rate; the first dock that closes is named. */
+static Status refuse_rate(Instance *instance, const double p[], const double rate[3]) {
+    const char *name = "", *words = "the change";
+#if DOCK_COUNT
+    for (size_t i = DOCK_COUNT; i > 0; i--)
+        if (closes(instance, &DOCKS[i - 1], p)) name = flag_name(&DOCKS[i - 1]), words = " = true with this motion";
+#else
+    (void)p;
+#endif
+    return instance_refuse(instance, "%s%s leaves angular_velocity = (%.10g, %.10g, %.10g) rad/s: must be finite", name,
+                           words, rate[0], rate[1], rate[2]);
+}
+
 /* The angular velocity after a change from what was committed to p, whose composite is c. */
 static Status rate_after(Instance *instance, const double p[], const double c[], double rate[3]) {
     const Dynamics *now = &instance->now;
-    double stage[INPUT_P_COUNT];
-    memcpy(rate, now->kept_rate, sizeof now->kept_rate);
-    if (memcmp(p, now->stepped_p, sizeof stage) == 0) return STATUS_OK;
-    copy_p(stage, now->stepped_p);
-#if MASSES_KEEP_MOMENTUM || POSES_KEEP_MOMENTUM
-    double stage_c[COMPOSITE_COUNT];
-    memcpy(stage_c, now->kept_c, sizeof stage_c);
     Status status = STATUS_OK;
-    bool left = take_over(stage, p, KIND_DOCKED, false);
-#if !MASSES_KEEP_MOMENTUM
-    left = take_over(stage, p, KIND_MASS, false) || left;
-#endif
-    if (left) status = composite_compute(instance, stage, stage_c);
-#if MASSES_KEEP_MOMENTUM
-    if (status == STATUS_OK) status = keep(instance, stage, stage_c, p, KIND_MASS, rate);
-#endif
-#if POSES_KEEP_MOMENTUM
-    if (status == STATUS_OK) status = keep(instance, stage, stage_c, p, KIND_POSE, rate);
-#endif
-    if (status != STATUS_OK) return status;
+    memcpy(rate, now->kept_rate, sizeof now->kept_rate);
+    if (memcmp(p, now->stepped_p, INPUT_P_COUNT * sizeof(double)) == 0) return STATUS_OK;
+#if MASSES_KEEP_MOMENTUM || POSES_KEEP_MOMENTUM
+    status = rate_kept(instance, p, rate);
 #endif
 #if DOCK_COUNT
-    dock(instance, stage, p, c, rate);
+    if (status == STATUS_OK) dock(instance, p, c, rate);
 #else
     (void)c;
 #endif
-    for (size_t i = 0; i < 3; i++)
-        if (!isfinite(rate[i]))
-            return instance_refuse(instance, "the change leaves angular_velocity = (%.10g, %.10g, %.10g) rad/s", rate[0],
-                                   rate[1], rate[2]);
-    return STATUS_OK;
+    const bool finite = isfinite(rate[0]) && isfinite(rate[1]) && isfinite(rate[2]);
+    return status != STATUS_OK || finite ? status : refuse_rate(instance, p, rate);
 }
 
 static void become_current(Instance *instance, const double p[], const double c[]) {
@@ -110,6 +155,7 @@ static void become_current(Instance *instance, const double p[], const double c[
 }
 
 static void begin_from_now(Dynamics *now) {
+    if (memcmp(now->stepped_p, now->p, INPUT_P_COUNT * sizeof(double)) != 0) now->epoch_holds = false;
     copy_p(now->stepped_p, now->p);
     memcpy(now->kept_c, now->c, sizeof now->kept_c);
 }
@@ -153,10 +199,6 @@ static bool docks_moved(const Instance *instance) {
 
 #else
 
-void changes_mirror(Instance *instance) {
-    (void)instance;
-}
-
 /* In continuous time a change that keeps momentum beside others that keep the rate would need the inputs' rates. */
 static Status check_continuous(Instance *instance, const double p[]) {
     const unsigned keeping = (MASSES_KEEP_MOMENTUM ? KIND_MASS : 0) | (POSES_KEEP_MOMENTUM ? KIND_POSE : 0);
@@ -181,7 +223,7 @@ Status changes_apply(Instance *instance, const double p[], const double c[]) {
     double rate[3];
     if (now->state & BEFORE_START) {
         become_current(instance, p, c);
-        instance->mirror_is_current = false;
+        instance_state_moved(instance);
         return STATUS_OK;
     }
     if (now->state == CONTINUOUS) {
@@ -191,13 +233,13 @@ Status changes_apply(Instance *instance, const double p[], const double c[]) {
 #endif
         become_current(instance, p, c);
         begin_from_now(now);
-        instance->mirror_is_current = false;
+        instance_state_moved(instance);
         return STATUS_OK;
     }
     const Status status = rate_after(instance, p, c, rate);
     if (status != STATUS_OK) return status;
     become_current(instance, p, c);
-    instance->mirror_is_current = false;
+    instance_state_moved(instance);
 #if STATE_IS_MOMENTUM
     if (states_lead(instance)) {
         double *momentum = instance_states(instance) + 4;
@@ -238,10 +280,6 @@ static int part_of(const int joined[], int vessel) {
     return vessel;
 }
 
-static const char *flag_name(const Dock *dock) {
-    return VARIABLES[REFERENCE_P + dock->flag].name;
-}
-
 /* Adds a closed dock to those before it: each port once, no loop. */
 static Status close_dock(Instance *instance, const Dock *closing, const Dock *const closed[], size_t count, int joined[]) {
     for (size_t i = 0; i < count; i++)
@@ -280,13 +318,6 @@ Status changes_check_docks(Instance *instance, const double p[]) {
     return status;
 }
 
-#else
-
-Status changes_check_docks(Instance *instance, const double p[]) {
-    (void)instance, (void)p;
-    return STATUS_OK;
-}
-
 #endif
 
 #if STATE_IS_MOMENTUM
@@ -318,8 +349,7 @@ void changes_start_reverse(Instance *instance, Variation *v) {
 
 /* The two stages between which momentum was kept last, or would be: before it and after it. */
 typedef struct {
-    double before[INPUT_P_COUNT], after[INPUT_P_COUNT];
-    double before_c[COMPOSITE_COUNT], after_c[COMPOSITE_COUNT];
+    Stage before, after;
     unsigned varied_before, varied_after; /* kinds of inputs that are as now */
 } Stages;
 
@@ -328,13 +358,14 @@ static Status stages_of(Instance *instance, Stages *stages) {
     const Dynamics *now = &instance->now;
     stages->varied_before = MASSES_KEEP_MOMENTUM ? 0 : KIND_MASS;
     stages->varied_after = MASSES_KEEP_MOMENTUM ? KIND_MASS : KIND_MASS | KIND_POSE;
-    copy_p(stages->before, now->stepped_p);
-    take_over(stages->before, now->p, stages->varied_before, false);
-    take_over(stages->before, now->p, KIND_DOCKED, false);
-    copy_p(stages->after, stages->before);
-    take_over(stages->after, now->p, stages->varied_after, false);
-    const Status status = composite_compute(instance, stages->before, stages->before_c);
-    return status == STATUS_OK ? composite_compute(instance, stages->after, stages->after_c) : status;
+    copy_p(stages->before.p, now->stepped_p);
+    memcpy(stages->before.c, now->kept_c, sizeof now->kept_c);
+    stages->before.c_is_current = true;
+    move_stage(&stages->before, now->p, KIND_DOCKED | stages->varied_before);
+    stages->after = stages->before;
+    move_stage(&stages->after, now->p, stages->varied_after);
+    const Status status = weigh(instance, &stages->before);
+    return status == STATUS_OK ? weigh(instance, &stages->after) : status;
 }
 
 /* Changes of a composite, dc, by those of the inputs of some kinds. */
@@ -347,18 +378,20 @@ static void composite_change(Instance *instance, const double p[], const Variati
     composite_forward(instance->arg, instance->res, instance->iw, instance->w, 0);
 }
 
-void changes_forward(Instance *instance, Variation *v) {
+Status changes_forward(Instance *instance, Variation *v) {
     Stages stages;
     double before[COMPOSITE_COUNT], after[COMPOSITE_COUNT], change[3];
     static const double none[3] = {0.0, 0.0, 0.0};
-    if (stages_of(instance, &stages) != STATUS_OK) return;
-    composite_change(instance, stages.before, v, stages.varied_before, before);
-    composite_change(instance, stages.after, v, stages.varied_after, after);
-    const double *const arguments[] = {instance->now.kept_rate, stages.before_c, stages.after_c, none, before, after};
+    const Status status = stages_of(instance, &stages);
+    if (status != STATUS_OK) return status;
+    composite_change(instance, stages.before.p, v, stages.varied_before, before);
+    composite_change(instance, stages.after.p, v, stages.varied_after, after);
+    const double *const arguments[] = {instance->now.kept_rate, stages.before.c, stages.after.c, none, before, after};
     memcpy(instance->arg, arguments, sizeof arguments);
     instance->res[0] = change;
     keep_momentum_forward(instance->arg, instance->res, instance->iw, instance->w, 0);
     for (size_t i = 0; i < 3; i++) v->x[4 + i] += change[i];
+    return STATUS_OK;
 }
 
 /* Adds weights on inputs of some kinds that follow from those on a composite. */
@@ -372,17 +405,19 @@ static void composite_weights(Instance *instance, const double p[], const double
         if (INPUT_KINDS[i] & kinds) v->inputs[i] += wp[i];
 }
 
-void changes_reverse(Instance *instance, Variation *v) {
+Status changes_reverse(Instance *instance, Variation *v) {
     Stages stages;
     double on_rate[3], before[COMPOSITE_COUNT], after[COMPOSITE_COUNT];
-    if (stages_of(instance, &stages) != STATUS_OK) return;
-    const double *const arguments[] = {instance->now.kept_rate, stages.before_c, stages.after_c, v->x + 4};
+    const Status status = stages_of(instance, &stages);
+    if (status != STATUS_OK) return status;
+    const double *const arguments[] = {instance->now.kept_rate, stages.before.c, stages.after.c, v->x + 4};
     double *const results[] = {on_rate, before, after};
     memcpy(instance->arg, arguments, sizeof arguments);
     memcpy(instance->res, results, sizeof results);
     keep_momentum_reverse(instance->arg, instance->res, instance->iw, instance->w, 0);
-    composite_weights(instance, stages.before, before, stages.varied_before, v);
-    composite_weights(instance, stages.after, after, stages.varied_after, v);
+    composite_weights(instance, stages.before.p, before, stages.varied_before, v);
+    composite_weights(instance, stages.after.p, after, stages.varied_after, v);
+    return STATUS_OK;
 }
 
 #endif

@@ -21,10 +21,10 @@ typedef struct {
 } Dock;
 
 extern const Dock DOCKS[DOCK_COUNT];
-#endif
 
 /* Judges which docks are closed; p holds their flags. */
 Status changes_check_docks(Instance *instance, const double p[]);
+#endif
 
 /* Makes the rate follow from a change to p, whose composite is c; they become current if it can. */
 Status changes_apply(Instance *instance, const double p[], const double c[]);
@@ -32,17 +32,55 @@ Status changes_apply(Instance *instance, const double p[], const double c[]);
 /* The inputs and the rate as they are now are those that the next change begins from. */
 void changes_commit(Instance *instance);
 
-/* Whether the rate has changed since the last commit. */
+/* Whether what the state of model exchange holds has changed since the last commit. */
 bool changes_moved(const Instance *instance);
+
+/* Goes on to EVENT; changes of inputs begin from the states as they are. */
+static inline void changes_enter_event(Instance *instance) {
+#if CHANGES
+    if (instance->now.state == CONTINUOUS) changes_commit(instance);
+#endif
+    instance->now.state = EVENT;
+}
+
+/* Ends an iteration of event mode: judges what was set, and whether that changed the states. */
+static inline Status changes_end_event(Instance *instance, bool *states_changed) {
+    const Status status = composite_refresh(instance);
+    *states_changed = false;
+#if CHANGES
+    if (status == STATUS_OK) {
+        *states_changed = changes_moved(instance);
+        changes_commit(instance);
+    }
+#endif
+    return status;
+}
+
+/* Goes on to CONTINUOUS, where what was set in event mode is not to be judged by the rules of continuous time. */
+static inline Status changes_enter_continuous(Instance *instance) {
+    Status status = STATUS_OK;
+#if CHANGES
+    bool states_changed;
+    status = changes_end_event(instance, &states_changed);
+#endif
+    if (status == STATUS_OK) instance->now.state = CONTINUOUS;
+    return status;
+}
 
 /* Where the state of model exchange is the angular momentum: makes x follow from the states in model exchange, the
    states from x elsewhere, unless they do. */
+#if STATE_IS_MOMENTUM
 void changes_mirror(Instance *instance);
+#else
+static inline void changes_mirror(Instance *instance) {
+    (void)instance;
+}
+#endif
 
 /* What small changes of the inputs make of the angular velocity, added to v->x: by what the last change kept. Reverse:
    weights on v->x to weights on the inputs. */
-void changes_forward(Instance *instance, Variation *v);
-void changes_reverse(Instance *instance, Variation *v);
+Status changes_forward(Instance *instance, Variation *v);
+Status changes_reverse(Instance *instance, Variation *v);
 
 /* The state's momentum at the start: a change of v->x, of rate, to one of momentum, and weights back. */
 void changes_start_forward(Instance *instance, Variation *v);

@@ -101,19 +101,39 @@ static Status check_inputs(Instance *instance, double p[]) {
             case CHECK_NONE: break;
         }
     }
-    return status == STATUS_OK ? changes_check_docks(instance, p) : status;
+#if DOCK_COUNT
+    if (status == STATUS_OK) status = changes_check_docks(instance, p);
+#endif
+    return status;
 }
 
-/* Judges what the inputs make together. */
-static Status check_composite(Instance *instance, const double *c) {
-    if (!(c[COMPOSITE_MASS] > 0.0 && c[COMPOSITE_MASS] <= DBL_MAX))
-        return instance_refuse(instance, "mass = %.10g kg: the total of all vessels must be finite and > 0",
-                               c[COMPOSITE_MASS]);
+/* Whether motion can be computed with a composite whose mass can be used. */
+static bool is_usable(const double *c) {
     const size_t count = LAW_TURNS ? COMPOSITE_COUNT : COMPOSITE_MARGINS;
     bool usable = true;
     for (size_t i = 0; i < count; i++) usable = usable && isfinite(c[i]);
     for (size_t i = COMPOSITE_MARGINS; i < COMPOSITE_LAW && LAW_TURNS; i++) usable = usable && c[i] > 0.0;
-    if (usable) return STATUS_OK;
+    return usable;
+}
+
+static bool has_mass(const double *c) {
+    return c[COMPOSITE_MASS] > 0.0 && c[COMPOSITE_MASS] <= DBL_MAX;
+}
+
+/* Judges what the inputs make together. */
+static Status check_composite(Instance *instance, const double *c) {
+    if (!has_mass(c))
+        return instance_refuse(instance, "mass = %.10g kg: the total of all vessels must be finite and > 0",
+                               c[COMPOSITE_MASS]);
+    if (is_usable(c)) return STATUS_OK;
+#if SPINS
+    const double *h = &c[COMPOSITE_SPIN];
+    if (!isfinite(h[3]) && isfinite(c[COMPOSITE_MARGINS]))
+        return instance_refuse(instance,
+                               "the ports that move give the vessels (%.10g, %.10g, %.10g) N.m.s: what this does "
+                               "leaves the range of finite numbers",
+                               h[0], h[1], h[2]);
+#endif
     const double *J = &c[COMPOSITE_INERTIA];
     return instance_refuse(instance,
                            "inertia (xx, yy, zz, xy, xz, yz) = (%.10g, %.10g, %.10g, %.10g, %.10g, %.10g) kg.m2: "
@@ -121,20 +141,34 @@ static Status check_composite(Instance *instance, const double *c) {
                            J[0], J[1], J[2], J[3], J[4], J[5], LAW_TURNS ? " and positive definite" : "");
 }
 
-Status composite_compute(Instance *instance, const double p[], double c[]) {
+static void compute(Instance *instance, const double p[], double c[]) {
     instance->arg[0] = p;
     instance->res[0] = c;
     composite(instance->arg, instance->res, instance->iw, instance->w, 0);
-    return check_composite(instance, c);
 }
+
+#if CHANGES
+
+Status composite_between(Instance *instance, const double p[], double c[]) {
+    compute(instance, p, c);
+    if (has_mass(c) && is_usable(c)) return STATUS_OK;
+    const double *J = &c[COMPOSITE_INERTIA];
+    return instance_refuse(instance,
+                           "between the changes of docks, masses and poses mass = %.10g kg, inertia (xx, yy, zz, xy, "
+                           "xz, yz) = (%.10g, %.10g, %.10g, %.10g, %.10g, %.10g) kg.m2: must be finite and positive "
+                           "definite for the angular momentum to be kept; make them one after the other",
+                           c[COMPOSITE_MASS], J[0], J[1], J[2], J[3], J[4], J[5]);
+}
+
+#endif
 
 /* p and c become current. */
 static Status adopt(Instance *instance, const double p[], const double c[]) {
 #if CHANGES
     return changes_apply(instance, p, c);
 #else
-    if (p != instance->now.p) memcpy(instance->now.p, p, INPUT_P_COUNT * sizeof(double));
-    if (c != instance->now.c) memcpy(instance->now.c, c, sizeof instance->now.c);
+    memcpy(instance->now.p, p, INPUT_P_COUNT * sizeof(double));
+    memcpy(instance->now.c, c, sizeof instance->now.c);
     return STATUS_OK;
 #endif
 }
@@ -147,11 +181,14 @@ Status composite_refresh(Instance *instance) {
     Status status = check_inputs(instance, p);
     if (status != STATUS_OK) return status;
     if (now->c[COMPOSITE_MASS] > 0.0 && memcmp(p, now->p, INPUT_P_COUNT * sizeof(double)) == 0) {
-        status = adopt(instance, now->p, now->c); /* changed there and back */
-        now->composite_is_current = status == STATUS_OK;
+#if CHANGES
+        status = changes_apply(instance, now->p, now->c);
+#endif
+        now->composite_is_current = status == STATUS_OK; /* changed there and back */
         return status;
     }
-    status = composite_compute(instance, p, c);
+    compute(instance, p, c);
+    status = check_composite(instance, c);
     if (status == STATUS_OK) status = adopt(instance, p, c);
     if (status != STATUS_OK) return status;
     now->composite_is_current = true;

@@ -51,9 +51,7 @@ static Status check_request(Instance *instance, const unsigned unknowns[], size_
     if (status == STATUS_OK) status = instance_check_attitude(instance);
     if (status == STATUS_OK) status = composite_refresh(instance);
     if (status == STATUS_OK) composite_refresh_axes(instance);
-#if STATE_IS_MOMENTUM
     if (status == STATUS_OK) changes_mirror(instance);
-#endif
     return status;
 }
 
@@ -81,11 +79,19 @@ static double *place(Variation *v, unsigned reference) {
     }
 }
 
+#if !STATE_IS_MOMENTUM && (MASSES_KEEP_MOMENTUM || POSES_KEEP_MOMENTUM)
+
+/* Whether the angular velocity follows from inputs: in co-simulation, but not within a step. */
+static bool rate_follows(const Instance *instance) {
+    return !instance->now.model_exchange && !(instance->now.state & (BEFORE_START | INTERMEDIATE));
+}
+
+#endif
+
 /* From changes of x, u, c to changes of rate and y. */
 static void respond(Instance *instance) {
     Variation *v = &instance->variation;
-    instance_set_arguments(instance);
-    instance->arg[0] = instance_states(instance);
+    instance_set_state_arguments(instance);
     instance->arg[4] = v->x;
     instance->arg[5] = v->inputs + INPUT_P_COUNT + INPUT_K_COUNT;
     instance->arg[6] = v->c;
@@ -105,8 +111,8 @@ static Status check_results(Instance *instance, const unsigned references[], siz
 
 Status derivatives_forward(Instance *instance, const unsigned unknowns[], size_t unknown_count,
                            const unsigned knowns[], size_t known_count, const double seed[], double sensitivity[]) {
-    const Status status = check_request(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity,
-                                        known_count, unknown_count);
+    Status status = check_request(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity,
+                                  known_count, unknown_count);
     if (status != STATUS_OK) return status;
     Variation *v = &instance->variation;
     memset(v, 0, sizeof *v);
@@ -128,7 +134,8 @@ Status derivatives_forward(Instance *instance, const unsigned unknowns[], size_t
 #if STATE_IS_MOMENTUM
     if (at_start) changes_start_forward(instance, v);
 #elif MASSES_KEEP_MOMENTUM || POSES_KEEP_MOMENTUM
-    if (shape_changes && instance->now.state == STEPPING) changes_forward(instance, v);
+    if (shape_changes && rate_follows(instance)) status = changes_forward(instance, v);
+    if (status != STATUS_OK) return status;
 #endif
     respond(instance);
     for (size_t i = 0; i < unknown_count; i++) sensitivity[i] = *place(v, unknowns[i]);
@@ -137,36 +144,37 @@ Status derivatives_forward(Instance *instance, const unsigned unknowns[], size_t
 
 Status derivatives_adjoint(Instance *instance, const unsigned unknowns[], size_t unknown_count,
                            const unsigned knowns[], size_t known_count, const double seed[], double sensitivity[]) {
-    const Status status = check_request(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity,
-                                        unknown_count, known_count);
+    Status status = check_request(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity,
+                                  unknown_count, known_count);
     if (status != STATUS_OK) return status;
     Variation *v = &instance->variation;
     double on_states[STATE_COUNT];
     memset(v, 0, sizeof *v);
     for (size_t i = 0; i < unknown_count; i++) *place(v, unknowns[i]) += seed[i];
     memcpy(on_states, v->x, sizeof on_states);
-    const bool at_start = instance->now.state & BEFORE_START;
-    instance_set_arguments(instance);
-    instance->arg[0] = instance_states(instance);
+    instance_set_state_arguments(instance);
     instance->arg[4] = v->rate;
     instance->arg[5] = v->y;
     instance->res[0] = v->x;
     instance->res[1] = v->inputs + INPUT_P_COUNT + INPUT_K_COUNT;
     instance->res[2] = v->c;
     response_reverse(instance->arg, instance->res, instance->iw, instance->w, 0);
-    for (size_t i = 0; i < STATE_COUNT && at_start; i++) v->x[i] += on_states[i];
+    if (instance->now.state & BEFORE_START) {
+        for (size_t i = 0; i < STATE_COUNT; i++) v->x[i] += on_states[i];
 #if STATE_IS_MOMENTUM
-    if (at_start) changes_start_reverse(instance, v);
+        changes_start_reverse(instance, v);
 #endif
+        project_attitude_start(instance, v->x);
+    }
     instance->arg[0] = instance->now.p;
     instance->arg[1] = v->c;
     instance->res[0] = v->inputs;
     composite_reverse(instance->arg, instance->res, instance->iw, instance->w, 0);
 #if !STATE_IS_MOMENTUM && (MASSES_KEEP_MOMENTUM || POSES_KEEP_MOMENTUM)
-    if (instance->now.state == STEPPING) changes_reverse(instance, v);
+    if (rate_follows(instance)) status = changes_reverse(instance, v);
+    if (status != STATUS_OK) return status;
 #endif
     composite_scale_variation(instance, v->inputs);
-    if (at_start) project_attitude_start(instance, v->x);
     for (size_t i = 0; i < known_count; i++) {
         const double *weight = place(v, knowns[i]);
         sensitivity[i] = weight ? *weight : 0.0;

@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "instance.h"
+#include "changes.h"
 
 enum {
     STARTED = INITIALIZATION | RUNNING | TERMINATED,
@@ -262,7 +262,7 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component instance, const fmi2Byte bytes[
 
 fmi2Status fmi2EnterEventMode(fmi2Component instance) {
     if (!instance || !instance_admits(instance, &ENTER_EVENT)) return fmi2Error;
-    instance_enter_event(instance);
+    changes_enter_event(instance);
     return fmi2OK;
 }
 
@@ -271,15 +271,14 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component instance, fmi2EventInfo *info) {
     if (!info) return (fmi2Status)instance_error(instance, "the event info is NULL");
     memset(info, 0, sizeof *info);
     bool states_changed;
-    const Status status = instance_update_discrete(instance, &states_changed);
+    const Status status = changes_end_event(instance, &states_changed);
     if (states_changed) info->valuesOfContinuousStatesChanged = fmi2True;
     return (fmi2Status)status;
 }
 
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component instance) {
     if (!instance || !instance_admits(instance, &ENTER_CONTINUOUS)) return fmi2Error;
-    ((Instance *)instance)->now.state = CONTINUOUS;
-    return fmi2OK;
+    return (fmi2Status)changes_enter_continuous(instance);
 }
 
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component instance, fmi2Boolean no_set_state_before_now,

@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "instance.h"
+#include "changes.h"
 
 enum { REPORT_SIZE = 256 };
 
@@ -47,7 +47,7 @@ static const Call SERIALIZE = {"fmi3SerializeFMUState", OUTSIDE_CALLBACK, STATUS
 static const Call DESERIALIZE = {"fmi3DeserializeFMUState", OUTSIDE_CALLBACK, STATUS_ERROR};
 static const Call ENTER_EVENT = {"fmi3EnterEventMode", EVENT_FOLLOWS, STATUS_ERROR};
 static const Call UPDATE_DISCRETE = {"fmi3UpdateDiscreteStates", EVENT, STATUS_DISCARD};
-static const Call ENTER_CONTINUOUS = {"fmi3EnterContinuousTimeMode", ONLY_EXCHANGE | EVENT, STATUS_ERROR};
+static const Call ENTER_CONTINUOUS = {"fmi3EnterContinuousTimeMode", ONLY_EXCHANGE | EVENT, STATUS_DISCARD};
 static const Call COMPLETED_STEP = {"fmi3CompletedIntegratorStep", CONTINUOUS, STATUS_ERROR};
 static const Call SET_TIME = {"fmi3SetTime", ONLY_EXCHANGE | CONTINUOUS | EVENT, STATUS_DISCARD};
 static const Call SET_STATES = {"fmi3SetContinuousStates", CONTINUOUS, STATUS_DISCARD};
@@ -319,7 +319,7 @@ fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
     if (!instance || !instance_admits(instance, &ENTER_EVENT)) return fmi3Error;
     if (HAS_EVENT_MODE && ((Instance *)instance)->now.state == STEPPING && !((Instance *)instance)->event_mode_used)
         return (fmi3Status)instance_error(instance, "eventModeUsed was false when the instance was made");
-    instance_enter_event(instance);
+    changes_enter_event(instance);
     return fmi3OK;
 }
 
@@ -332,15 +332,14 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *need_upd
         return (fmi3Status)instance_error(instance, "an argument for a result is NULL");
     *need_update = *terminate = *nominals_changed = *values_changed = *next_event_time_defined = fmi3False;
     bool states_changed;
-    const Status status = instance_update_discrete(instance, &states_changed);
+    const Status status = changes_end_event(instance, &states_changed);
     if (states_changed) *values_changed = fmi3True;
     return (fmi3Status)status;
 }
 
 fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance) {
     if (!instance || !instance_admits(instance, &ENTER_CONTINUOUS)) return fmi3Error;
-    ((Instance *)instance)->now.state = CONTINUOUS;
-    return fmi3OK;
+    return (fmi3Status)changes_enter_continuous(instance);
 }
 
 fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean no_set_state_before_now,

@@ -44,7 +44,7 @@ void instance_reset(Instance *instance) {
     memset(&instance->now, 0, sizeof instance->now);
     instance->now.state = INSTANTIATED;
     instance->now.model_exchange = model_exchange;
-    instance->outputs_are_current = instance->rates_are_current = instance->mirror_is_current = false;
+    instance_state_moved(instance);
     instance->now.tolerance = TOLERANCE;
     for (size_t i = 0; i < VARIABLE_COUNT; i++) instance->now.values[i] = VARIABLES[i].start;
     instance_start_rate(instance);
@@ -159,13 +159,13 @@ Status instance_start_attitude(Instance *instance) {
     const bool is_unit = fabs(plain - 1.0) <= 4.0 * DBL_EPSILON;
     double *x = instance_x(instance);
     for (size_t i = 0; i < 4; i++) x[i] = is_unit ? attitude[i] : attitude[i] / largest / sqrt(square);
-    instance->outputs_are_current = instance->rates_are_current = instance->mirror_is_current = false;
+    instance_state_moved(instance);
     return STATUS_OK;
 }
 
 void instance_start_rate(Instance *instance) {
     memcpy(instance_x(instance) + 4, &instance->now.values[REFERENCE_RATE_START], 3 * sizeof(double));
-    instance->outputs_are_current = instance->rates_are_current = instance->mirror_is_current = false;
+    instance_state_moved(instance);
 }
 
 Status instance_exit_initialization(Instance *instance) {
@@ -180,23 +180,4 @@ Status instance_exit_initialization(Instance *instance) {
 #endif
     instance->now.state = instance->now.model_exchange ? EVENT : STEPPING;
     return STATUS_OK;
-}
-
-void instance_enter_event(Instance *instance) {
-#if CHANGES
-    if (instance->now.state == CONTINUOUS) changes_commit(instance);
-#endif
-    instance->now.state = EVENT;
-}
-
-Status instance_update_discrete(Instance *instance, bool *states_changed) {
-    *states_changed = false;
-    const Status status = composite_refresh(instance);
-#if CHANGES
-    if (status == STATUS_OK) {
-        *states_changed = changes_moved(instance);
-        changes_commit(instance);
-    }
-#endif
-    return status;
 }

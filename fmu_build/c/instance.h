@@ -97,7 +97,9 @@ struct Instance {
     Dynamics now;
     bool outputs_are_current;         /* the outputs in now.values follow from states, inputs and now.c */
     bool rates_are_current;           /* so do the rates */
-    bool mirror_is_current;           /* where the states hold the momentum: x and they agree */
+#if STATE_IS_MOMENTUM
+    bool mirror_is_current;           /* x and the states agree */
+#endif
     Variation variation;
     const double *arg[WORK_ARG];
     double *res[WORK_RES];
@@ -158,13 +160,28 @@ static inline double *instance_x(Instance *instance) {
 #endif
 }
 
-/* Points the first arguments of the model's functions to x, u, c, a, and the estimate. */
+/* What follows from attitude, angular velocity or states has to be computed anew. */
+static inline void instance_state_moved(Instance *instance) {
+    instance->outputs_are_current = instance->rates_are_current = false;
+#if STATE_IS_MOMENTUM
+    instance->mirror_is_current = false;
+#endif
+}
+
+/* Points the first arguments of the model's functions to x, u, c, a, and the estimate. Of ode and response the first
+   one is the states instead. */
 static inline void instance_set_arguments(Instance *instance) {
     instance->arg[0] = instance_x(instance);
     instance->arg[1] = &instance->now.values[REFERENCE_TORQUE];
     instance->arg[2] = instance->now.c;
     instance->arg[3] = instance->now.a;
     instance->arg[4] = &instance->now.error_estimate;
+}
+static inline void instance_set_state_arguments(Instance *instance) {
+    instance_set_arguments(instance);
+#if STATE_IS_MOMENTUM
+    instance->arg[0] = instance_states(instance);
+#endif
 }
 
 /* Sets the time to start at and, if defined, the time not to be passed [s] and the importer's own tolerance. */
@@ -173,12 +190,6 @@ Status instance_set_experiment(Instance *instance, bool tolerance_defined, doubl
 
 /* Judges what was set, fixes the state at the start and goes on to STEPPING or EVENT. */
 Status instance_exit_initialization(Instance *instance);
-
-/* Goes on to EVENT; changes of inputs begin from the states as they are. */
-void instance_enter_event(Instance *instance);
-
-/* Ends an iteration of event mode: judges what was set. Whether that changed the states. */
-Status instance_update_discrete(Instance *instance, bool *states_changed);
 
 /* Takes the states at the start from the parameters, the attitude at length 1. */
 Status instance_start_attitude(Instance *instance);
@@ -209,8 +220,10 @@ Status instance_get_nominals(Instance *instance, double nominals[], size_t count
 /* composite.c: makes c follow from the inputs, unless it does: judges them and computes the composite. */
 Status composite_refresh(Instance *instance);
 
-/* Computes and judges the composite c of inputs p. */
-Status composite_compute(Instance *instance, const double p[], double c[]);
+#if CHANGES
+/* Computes and judges the composite c of inputs p on the way of a change. */
+Status composite_between(Instance *instance, const double p[], double c[]);
+#endif
 
 /* Makes a follow from c, unless it does. */
 void composite_refresh_axes(Instance *instance);

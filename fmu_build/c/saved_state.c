@@ -39,7 +39,7 @@ Status saved_state_restore(Instance *instance, const void *saved) {
         return instance_error(instance, "the FMU state is one of %s, this instance is not",
                               dynamics->model_exchange ? "model exchange" : "co-simulation");
     memcpy(&instance->now, saved, sizeof(Dynamics));
-    instance->outputs_are_current = instance->rates_are_current = instance->mirror_is_current = false;
+    instance_state_moved(instance);
     return STATUS_OK;
 }
 

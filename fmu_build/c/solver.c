@@ -403,7 +403,7 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
     while (progress.remaining > 0.0) {
         instance->call = call;
         status = advance(instance, &progress);
-        instance->outputs_are_current = instance->rates_are_current = false;
+        instance_state_moved(instance);
         if (status != STATUS_OK) {
             memcpy(instance_x(instance), start, sizeof start);
             now->values[REFERENCE_TIME] = start_time;
@@ -425,7 +425,6 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
 #if CHANGES
     memcpy(now->kept_rate, instance_x(instance) + 4, sizeof now->kept_rate);
     if (progress.composite_changed) memcpy(now->kept_c, now->c, sizeof now->kept_c);
-    instance->mirror_is_current = false;
 #endif
     memcpy(now->stepped_p, now->p, sizeof now->p);
     return STATUS_OK;

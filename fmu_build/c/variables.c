@@ -8,15 +8,6 @@
 static const double SMALLEST_SQUARE = 1e-200;
 static const double LARGEST_SQUARE = 1e200;
 
-/* x and the states agree from here on. */
-static void mirror(Instance *instance) {
-#if STATE_IS_MOMENTUM
-    changes_mirror(instance);
-#else
-    (void)instance;
-#endif
-}
-
 static Status unknown_reference(Instance *instance, unsigned reference) {
     return instance_error(instance, "value reference %u is unknown; the largest is %d", reference, VARIABLE_COUNT - 1);
 }
@@ -43,7 +34,7 @@ Status instance_check_references(Instance *instance, const unsigned references[]
 }
 
 Status instance_check_attitude(Instance *instance) {
-    mirror(instance);
+    changes_mirror(instance);
     const double *q = instance_x(instance);
     const double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
     if (!(square >= SMALLEST_SQUARE && square <= LARGEST_SQUARE))
@@ -65,9 +56,8 @@ static Status refresh_outputs(Instance *instance) {
 
 static Status refresh_rates(Instance *instance) {
     if (instance->rates_are_current) return STATUS_OK;
-    mirror(instance);
-    instance_set_arguments(instance);
-    instance->arg[0] = instance_states(instance);
+    changes_mirror(instance);
+    instance_set_state_arguments(instance);
     instance->res[0] = instance_rates(instance);
     ode(instance->arg, instance->res, instance->iw, instance->w, 0);
     instance->rates_are_current = true;
@@ -83,7 +73,7 @@ static Status prepare(Instance *instance, unsigned wanted) {
         if (wanted & FOLLOWS_ATTITUDE) status = instance_start_attitude(instance);
     }
     if (status == STATUS_OK && (wanted & FOLLOWS_COMPOSITE)) status = composite_refresh(instance);
-    if (status == STATUS_OK && (wanted & FOLLOWS_STATES)) mirror(instance);
+    if (status == STATUS_OK && (wanted & FOLLOWS_STATES)) changes_mirror(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_AXES)) composite_refresh_axes(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_OUTPUTS)) status = refresh_outputs(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_RATES)) status = refresh_rates(instance);
@@ -153,9 +143,29 @@ static Status check_set(Instance *instance, unsigned reference, double value) {
     return refuse_not_finite(instance, variable, value);
 }
 
-/* The states lead now: a change of inputs goes on from them. */
-static void states_were_set(Instance *instance) {
-    instance->outputs_are_current = instance->rates_are_current = instance->mirror_is_current = false;
+#if CHANGES
+
+static bool hold_states(const unsigned references[], size_t count) {
+    bool held = false;
+    for (size_t i = 0; i < count; i++) held = held || references[i] >= REFERENCE_STATES;
+    return held;
+}
+
+#endif
+
+/* States that are set in event mode go with the inputs set before them: those are judged, and make their change. */
+static Status before_states(Instance *instance) {
+#if CHANGES
+    if (instance->now.state == EVENT) return composite_refresh(instance);
+#else
+    (void)instance;
+#endif
+    return STATUS_OK;
+}
+
+/* What is set after them makes a change that begins from them. */
+static void after_states(Instance *instance) {
+    instance_state_moved(instance);
 #if CHANGES
     if (instance->now.state == EVENT) changes_commit(instance);
 #endif
@@ -169,16 +179,22 @@ Status instance_set(Instance *instance, const unsigned references[], size_t coun
         const Status status = check_set(instance, references[i], values[i]);
         if (status != STATUS_OK) return status;
     }
-    bool changed = false, shape_changed = false, states_changed = false;
+#if CHANGES
+    const bool holds_states = hold_states(references, count);
+    const Status status = holds_states ? before_states(instance) : STATUS_OK;
+    if (status != STATUS_OK) return status;
+#endif
+    bool changed = false, shape_changed = false;
     for (size_t i = 0; i < count; i++) {
         double *value = &instance->now.values[references[i]];
         if (*value == values[i]) continue;
         *value = values[i];
         changed = true;
         shape_changed = shape_changed || references[i] < REFERENCE_TORQUE;
-        states_changed = states_changed || references[i] >= REFERENCE_STATES;
     }
-    if (states_changed) states_were_set(instance);
+#if CHANGES
+    if (holds_states) after_states(instance);
+#endif
     if (changed) instance->outputs_are_current = instance->rates_are_current = false;
     if (shape_changed) instance->now.composite_is_current = false;
     return STATUS_OK;
@@ -231,19 +247,22 @@ static Status check_states(Instance *instance, const void *array, size_t count) 
 
 Status instance_get_states(Instance *instance, double states[], size_t count) {
     Status status = check_states(instance, states, count);
-    if (status == STATUS_OK) status = prepare(instance, VARIABLES[REFERENCE_STATES + 4].follows | FOLLOWS_ATTITUDE);
+    const unsigned follows = FOLLOWS_STATES | (CHANGES ? FOLLOWS_COMPOSITE : 0);
+    if (status == STATUS_OK) status = prepare(instance, follows | FOLLOWS_ATTITUDE);
     if (status == STATUS_OK) memcpy(states, instance_states(instance), STATE_COUNT * sizeof(double));
     return status;
 }
 
 Status instance_set_states(Instance *instance, const double states[], size_t count) {
-    const Status status = check_states(instance, states, count);
+    Status status = check_states(instance, states, count);
     if (status != STATUS_OK) return status;
     for (size_t i = 0; i < STATE_COUNT; i++)
         if (!isfinite(states[i]))
             return refuse_not_finite(instance, &VARIABLES[REFERENCE_STATES + i], states[i]);
+    status = before_states(instance);
+    if (status != STATUS_OK) return status;
     memcpy(instance_states(instance), states, STATE_COUNT * sizeof(double));
-    states_were_set(instance);
+    after_states(instance);
     return STATUS_OK;
 }
 

@@ -58,8 +58,8 @@ def rotation_matrix(attitude: ca.SX) -> ca.SX:
 def quaternion(rotation: ca.SX) -> ca.SX:
     """Returns the unit quaternion, (4,), scalar part >= 0, of a rotation matrix, (3, 3).
 
-    Of the four multiples of the quaternion that the matrix gives the longest is brought to unit length; it jumps
-    to its negative where the body has turned by 180 degrees.
+    Of the four multiples of the quaternion that the matrix gives the longest is brought to unit length; it
+    jumps to its negative where the body has turned by 180 degrees.
     """
     R = rotation
     x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]

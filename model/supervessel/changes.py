@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from supervessel.docking import composite_body, constant
 from supervessel.inertia import from_upper_triangle, ldl, ldl_solve
-from supervessel.rotation import RotationLaw
+from supervessel.rotation import LAWS
 from supervessel.scene import Scene
 from supervessel.variables import input_variables
 
@@ -41,7 +41,7 @@ class Change:
 
 
 def change_functions(
-    scene: Scene, law: RotationLaw, c: ca.SX, parts_of: Callable[[ca.SX], Parts], p: ca.SX, k: ca.SX
+    scene: Scene, c: ca.SX, parts_of: Callable[[ca.SX], Parts], p: ca.SX, k: ca.SX
 ) -> Change:
     """Returns the functions of what changes.
 
@@ -49,6 +49,7 @@ def change_functions(
     parts_of : composite -> its parts
     p, k     : symbols of the inputs that shape the composite, of the motion at contact
     """
+    law = LAWS[scene.rotation.law]
     omega, added, d = ca.SX.sym("omega", 3), ca.SX.sym("added", 3), ca.SX.sym("d", c.numel())
     before, after = parts_of(c), parts_of(d)
     kept, kept_after = (law.keeping(from_upper_triangle(parts["inertia"])) for parts in (before, after))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from math import frexp, ldexp
 
 import casadi as ca
@@ -115,20 +116,18 @@ def placed_groups(scene: Scene, lookup: Lookup) -> list[PlacedGroup]:
     """Returns the rigid groups of a scene, the root's own first."""
     parts = groups(scene)
     inside = [_inside(scene, part, lookup) for part in parts]
-    home = {vessel: number for number, part in enumerate(parts) for vessel in part.vessels}
-    poses: dict[Way, Pose] = {}
+    pose_by = _placing(scene, lookup, inside)
     placed = []
     for number, alternatives in enumerate(ways(scene, parts)):
-        for way in alternatives:
-            _place(scene, way, lookup, inside, home, poses)
+        poses = [pose_by(way) for way in alternatives]
         attached = [_all_true(way, lookup) for way in alternatives]
         holding = [i for i, flag in enumerate(attached) if flag is None]
         if len(alternatives) == 1 or holding:  # no other way can hold beside one that always does
             always = holding[0] if holding else 0
-            placed.append(PlacedGroup(poses[alternatives[always]], attached[always], inside[number]))
+            placed.append(PlacedGroup(poses[always], attached[always], inside[number]))
         else:
             flags = [flag for flag in attached if flag is not None]
-            holds, pose = _chosen(flags, [poses[way] for way in alternatives])
+            holds, pose = _chosen(flags, poses)
             placed.append(PlacedGroup(pose, holds, inside[number]))
     return placed
 
@@ -141,26 +140,24 @@ def _inside(scene: Scene, part: Group, lookup: Lookup) -> dict[str, Pose]:
     return poses
 
 
-def _place(
-    scene: Scene,
-    way: Way,
-    lookup: Lookup,
-    inside: Sequence[dict[str, Pose]],
-    home: dict[str, int],
-    poses: dict[Way, Pose],
-) -> None:
-    """Adds the pose of a group that it has by one way, and of those before it on that way."""
-    if way in poses:
-        return
-    if way.joint is None or way.before is None:
-        poses[way] = inside[0][scene.root]
-        return
-    _place(scene, way.before, lookup, inside, home, poses)
-    joint = way.joint
-    step = inside[home[joint.parent]][joint.parent].then(_joint_pose(scene, joint, lookup))
-    own = inside[way.group][joint.child]
-    is_reference = next(iter(inside[way.group])) == joint.child
-    poses[way] = poses[way.before].then(step if is_reference else step.then(own.inverse()))
+def _placing(scene: Scene, lookup: Lookup, inside: Sequence[dict[str, Pose]]) -> Callable[[Way], Pose]:
+    """Returns the function that gives a group's pose by one way.
+
+    inside : poses of the vessels of each group in its axes
+    """
+    home = {vessel: poses for poses in inside for vessel in poses}
+
+    @cache
+    def pose_by(way: Way) -> Pose:
+        if way.joint is None or way.before is None:
+            return inside[0][scene.root]
+        joint = way.joint
+        step = home[joint.parent][joint.parent].then(_joint_pose(scene, joint, lookup))
+        own = inside[way.group][joint.child]
+        is_reference = next(iter(inside[way.group])) == joint.child
+        return pose_by(way.before).then(step if is_reference else step.then(own.inverse()))
+
+    return pose_by
 
 
 def _all_true(way: Way, lookup: Lookup) -> ca.SX | None:

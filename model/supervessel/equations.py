@@ -215,7 +215,7 @@ def equations(scene: Scene) -> Equations:
     )
     if plan.free != "never":
         propagation += free_functions(a.numel(), slices["free"])
-    change = change_functions(scene, law, c, parts_of, p, k) if changes_rate(scene) else None
+    change = change_functions(scene, c, parts_of, p, k) if changes_rate(scene) else None
     z = ca.SX.sym("z", 7)
     by_momentum = change is not None and keeps_momentum(scene)
     x_of_z = ca.vertcat(z[:4], change.rate_of_momentum(z[4:], c)) if change and by_momentum else x
@@ -223,7 +223,7 @@ def equations(scene: Scene) -> Equations:
 
     def outputs_from(x: ca.SX) -> ca.SX:
         shown = a[slices["principal"]] if "principal" in slices else ca.SX.zeros(7)
-        return _outputs(scene, x, u, parts, shown, e)
+        return _outputs(scene, x, u, parts | {"principal": shown, "error_estimate": e})
 
     y = outputs_from(x_of_z)
     z_rate = rate(x)
@@ -413,11 +413,10 @@ def _split(vector: ca.SX, like: list[ca.SX]) -> list[ca.SX]:
     return [vector[int(start) : int(end)] for start, end in pairwise(ends)]
 
 
-def _outputs(
-    scene: Scene, x: ca.SX, u: ca.SX, parts: dict[str, ca.SX], principal_part: ca.SX, estimate: ca.SX
-) -> ca.SX:
+def _outputs(scene: Scene, x: ca.SX, u: ca.SX, parts: dict[str, ca.SX]) -> ca.SX:
     """Returns the scene's outputs, in its order.
 
+    parts : those of c, "principal" of a, and "error_estimate"
     The attitude is brought to unit length once more: as a state it keeps it only to the accuracy of
     whoever integrates it.
     """
@@ -434,9 +433,9 @@ def _outputs(
         "attitude": attitude,
         "kinetic_energy": 0.5 * ca.dot(omega, turned),
         "angular_momentum": to_inertial(attitude, momentum),
-        "principal_moments": principal_part[:3],
-        "principal_axes": principal_part[3:],
-        "error_estimate": estimate,
+        "principal_moments": parts["principal"][:3],
+        "principal_axes": parts["principal"][3:],
+        "error_estimate": parts["error_estimate"],
         "net_force": net_force(scene, parts, u),
     }
     for name in vessels_shown(scene):

@@ -179,31 +179,40 @@ def _inputs(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[
     all_resolved = not any(_port_problem(name, ports) for name in docked)
     posed = _list(inputs, "pose")
     docks = list(_dock_names(raw).values())
+
+    def pose_problem(key: str, name: str) -> str | None:
+        problem = _port_problem(name, ports)
+        if not problem and key == "motion" and name not in posed:
+            return f"{name} is not listed in inputs.pose; only a pose that is an input moves"
+        if not problem and name not in docked and all_resolved:
+            return f"{name} is not docked; its pose would change nothing"
+        return problem
+
+    def vessel_problem(key: str, name: str) -> str | None:
+        if name not in ports:
+            return unknown("vessel", name, ports)
+        if key == "pmi" and "inertia" in _table(_table(raw, "vessels"), name):
+            return f"{name} is given by inertia; only a vessel given by pmi has this input"
+        return None
+
+    def problem_of(key: str, name: str) -> str | None:
+        if key in ("pose", "motion"):
+            return pose_problem(key, name)
+        if key == "docked":
+            return None if name in docks else unknown("dock", name, docks)
+        if key == "force":
+            return _port_problem(name, points, "point")
+        return vessel_problem(key, name)
+
     for key in ("mass", "pmi", "pose", "motion", "docked", "force", "vessel_torque"):
         names = [name for name in _list(inputs, key) if isinstance(name, str)]
         place = f"inputs.{key}"
         for name in sorted({name for name in names if names.count(name) > 1}):
             yield f"{place}: {name} is listed {names.count(name)} times"
         for name in dict.fromkeys(names):
-            if key in ("pose", "motion"):
-                problem = _port_problem(name, ports)
-                if problem:
-                    yield f"{place}: {problem}"
-                elif key == "motion" and name not in posed:
-                    yield f"{place}: {name} is not listed in inputs.pose; only a pose that is an input moves"
-                elif name not in docked and all_resolved:
-                    yield f"{place}: {name} is not docked; its pose would change nothing"
-            elif key == "docked":
-                if name not in docks:
-                    yield f"{place}: {unknown('dock', name, docks)}"
-            elif key == "force":
-                problem = _port_problem(name, points, "point")
-                if problem:
-                    yield f"{place}: {problem}"
-            elif name not in ports:
-                yield f"{place}: {unknown('vessel', name, ports)}"
-            elif key == "pmi" and "inertia" in _table(_table(raw, "vessels"), name):
-                yield f"{place}: {name} is given by inertia; only a vessel given by pmi has this input"
+            problem = problem_of(key, name)
+            if problem:
+                yield f"{place}: {problem}"
 
 
 def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:

@@ -71,9 +71,9 @@ def vessels_shown(scene: Scene) -> list[str]:
 SIZES = {"docked": 1, "origin": 3, "centre": 3, "rotation": 9, "rate": 3, "inertia": 6, "spin": 3}
 """Layout of what c holds of a vessel that outputs are about; zero while it is not docked.
 
-docked, 1 or 0; origin, centre of mass [m] from the barycentre; rotation, column by column, into body axes; rate
-[rad/s] relative to the body axes, in them; inertia [kg m2] about the barycentre; spin [N m s] about it of its motion
-relative to the body axes.
+docked, 1 or 0; origin, centre of mass [m] from the barycentre; rotation, column by column, into body axes;
+rate [rad/s] relative to the body axes, in them; inertia [kg m2] about the barycentre; spin [N m s] about it
+of its motion relative to the body axes.
 """
 
 

@@ -283,9 +283,8 @@ def scene(raw: Mapping[str, Any]) -> Scene:
     unless = {"rotation.propagator": "rk4"}
     if raw.get("inputs", {}).get("pose") and not raw["inputs"].get("motion"):
         unless["rotation.pose_change"] = "rate"
-    return parse_scene(
-        variant(raw, {k: given.get(k.removeprefix("rotation."), v) for k, v in unless.items()})
-    )
+    changes = {k: given.get(k.removeprefix("rotation."), v) for k, v in unless.items()}
+    return parse_scene(variant(raw, changes))
 
 
 def relative_error(value: Any, truth: Any) -> float:
