@@ -1,6 +1,7 @@
 """The docks of a scene as a graph: rigid groups of vessels, and the ways by which they hang on the root."""
 
-from collections.abc import Iterator, Sequence
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from supervessel.scene import Dock, Scene
@@ -48,7 +49,7 @@ class Group:
         return (self.reference, *(joint.child for joint in self.joints))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Way:
     """A way by which a group hangs on the root; it counts while every dock on it is closed.
 
@@ -64,28 +65,35 @@ class Way:
     @property
     def docks(self) -> tuple[str, ...]:
         """Names of the inputs that must be true."""
-        if self.joint is None or self.before is None:
-            return ()
-        return self.before.docks + ((self.joint.dock,) if self.joint.dock else ())
+        names = [way.joint.dock for way in self._backwards() if way.joint and way.joint.dock]
+        return tuple(reversed(names))
 
     def passes(self, group: int) -> bool:
-        return self.group == group or (self.before is not None and self.before.passes(group))
+        return any(way.group == group for way in self._backwards())
+
+    def _backwards(self) -> "Iterator[Way]":
+        """Yields this way, then those before it."""
+        way: Way | None = self
+        while way is not None:
+            yield way
+            way = way.before
 
 
 def joints(scene: Scene) -> Iterator[Joint]:
     """Yields the docks closed at the start so that every parent is the root or an earlier joint's child."""
-    return _spread(scene, scene.root, [dock for dock in scene.docks if dock.docked])
+    return _spread(scene.root, _neighbours(scene, [dock for dock in scene.docks if dock.docked]))
 
 
 def groups(scene: Scene) -> tuple[Group, ...]:
     """Returns the rigid groups, the root's own first, in the order in which they hang on it."""
     moving = set(scene.inputs.pose)
     rigid = [d for d in scene.docks if not switchable(scene, d) and not moving.intersection(d.ports)]
+    rigidly, somehow = _neighbours(scene, rigid), _neighbours(scene, scene.docks)
     found: list[Group] = []
     taken: set[str] = set()
-    for vessel in (scene.root, *(joint.child for joint in _spread(scene, scene.root, scene.docks))):
+    for vessel in (scene.root, *(joint.child for joint in _spread(scene.root, somehow))):
         if vessel not in taken:
-            found.append(Group(vessel, tuple(_spread(scene, vessel, rigid))))
+            found.append(Group(vessel, tuple(_spread(vessel, rigidly))))
             taken.update(found[-1].vessels)
     return tuple(found)
 
@@ -96,10 +104,11 @@ def ways(scene: Scene, parts: Sequence[Group]) -> list[list[Way]]:
     Raises TooManyWaysError.
     """
     home = {vessel: number for number, part in enumerate(parts) for vessel in part.vessels}
+    neighbours = _neighbours(scene, scene.docks)
     found: list[list[Way]] = [[] for _ in parts]
-    waiting = [Way(0)]
+    waiting = deque([Way(0)])
     while waiting:
-        way = waiting.pop(0)
+        way = waiting.popleft()
         found[way.group].append(way)
         if len(found[way.group]) > MOST_WAYS:
             raise TooManyWaysError(
@@ -107,7 +116,7 @@ def ways(scene: Scene, parts: Sequence[Group]) -> list[list[Way]]:
                 "at most that many are possible"
             )
         for vessel in parts[way.group].vessels:
-            for joint in _joints_of(scene, vessel, scene.docks):
+            for joint in neighbours.get(vessel, []):
                 group = home[joint.child]
                 if not way.passes(group):
                     waiting.append(Way(group, joint, way))
@@ -119,26 +128,24 @@ def switchable(scene: Scene, dock: Dock) -> bool:
     return dock.name is not None and dock.name in scene.inputs.docked
 
 
-def _joints_of(scene: Scene, vessel: str, docks: Sequence[Dock]) -> Iterator[Joint]:
-    """Yields docks of a vessel, seen from it."""
+def _neighbours(scene: Scene, docks: Sequence[Dock]) -> dict[str, list[Joint]]:
+    """Returns the docks of each vessel that has any, seen from it."""
+    neighbours: dict[str, list[Joint]] = {}
     for dock in docks:
         name = dock.name if switchable(scene, dock) else None
         for here, there in (dock.ports, dock.ports[::-1]):
             parent, parent_port = here.split(".")
-            if parent == vessel:
-                child, child_port = there.split(".")
-                yield Joint(parent, parent_port, child, child_port, name)
+            child, child_port = there.split(".")
+            joint = Joint(parent, parent_port, child, child_port, name)
+            neighbours.setdefault(parent, []).append(joint)
+    return neighbours
 
 
-def _spread(scene: Scene, start: str, docks: Sequence[Dock]) -> Iterator[Joint]:
+def _spread(start: str, neighbours: Mapping[str, Sequence[Joint]]) -> Iterator[Joint]:
     """Yields joints from a vessel outwards, parents first, each vessel once."""
-    neighbours: dict[str, list[Joint]] = {}
-    for dock in docks:
-        for vessel in {port.partition(".")[0] for port in dock.ports}:
-            neighbours.setdefault(vessel, []).extend(_joints_of(scene, vessel, [dock]))
-    placed, waiting = {start}, [start]
+    placed, waiting = {start}, deque([start])
     while waiting:
-        for joint in neighbours.get(waiting.pop(0), []):
+        for joint in neighbours.get(waiting.popleft(), ()):
             if joint.child not in placed:
                 placed.add(joint.child)
                 waiting.append(joint.child)

@@ -12,8 +12,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from supervessel.docking import composite_body, constant
+from supervessel.docking import composite_body
 from supervessel.inertia import from_upper_triangle, ldl, ldl_solve
+from supervessel.poses import constant
 from supervessel.rotation import LAWS
 from supervessel.scene import Scene
 from supervessel.variables import input_variables

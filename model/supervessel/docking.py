@@ -1,52 +1,21 @@
-"""Docking geometry in CasADi symbols: port frames, mating, and the bodies of a scene in the root's axes."""
+"""Docking in CasADi symbols: the vessels of a scene, placed in the root's axes and put together."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from math import frexp, ldexp
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from supervessel.assembly import Group, Joint, Way, groups, ways
-from supervessel.inertia import Body, combine, congruence, orbiter_moments, symmetric
-from supervessel.quantities import Vector
+from supervessel.assembly import Joint, Way, groups, ways
+from supervessel.inertia import Body, combine, orbiter_moments, placed_body, symmetric
+from supervessel.lumps import Places, lump, places
+from supervessel.poses import Pose, constant, mated_pose, port_axes, scaled
 from supervessel.scene import Scene
 
 Lookup = Callable[[str, ArrayLike], ca.SX]
 """Takes an input's name without index and the scene's value; returns its symbols, or the constant."""
-
-
-@dataclass(frozen=True)
-class Pose:
-    """Where a frame stands: rotation (3, 3) out of it and its origin (3,) [m], both in outer axes.
-
-    velocity, rate : (3,) [m/s] of the origin and (3,) [rad/s], relative to the outer axes, in them; both None
-                     where the frame is at rest there
-    """
-
-    rotation: ca.SX
-    origin: ca.SX
-    velocity: ca.SX | None = None
-    rate: ca.SX | None = None
-
-    def then(self, inner: "Pose") -> "Pose":
-        """Returns the pose, in these outer axes, of a frame whose pose is known in this one."""
-        arm = self.rotation @ inner.origin
-        rotation, origin = self.rotation @ inner.rotation, self.origin + arm
-        velocity, rate = self.velocity, self.rate
-        if velocity is not None and rate is not None:
-            velocity = velocity + ca.cross(rate, arm)
-        if inner.velocity is not None and inner.rate is not None:
-            shift, turn = self.rotation @ inner.velocity, self.rotation @ inner.rate
-            velocity = shift if velocity is None else velocity + shift
-            rate = turn if rate is None else rate + turn
-        return Pose(rotation, origin, velocity, rate)
-
-    def inverse(self) -> "Pose":
-        """Returns the pose of the outer axes in this frame, which is at rest."""
-        return Pose(self.rotation.T, -(self.rotation.T @ self.origin))
 
 
 @dataclass(frozen=True)
@@ -55,38 +24,16 @@ class PlacedGroup:
 
     pose     : of the group's axes in the root vessel's
     attached : 1 while docks hold it to the root, else 0; None: always
-    inside   : poses of its vessels in the group's axes
+    inside   : poses of its vessels in the group's axes, constants
     """
 
     pose: Pose
     attached: ca.SX | None
-    inside: dict[str, Pose]
+    inside: Places
 
-
-def port_axes(direction: ca.SX, alignment: ca.SX) -> ca.SX:
-    """Returns the orthonormal columns (d, a, d x a), (3, 3), of a port, vessel axes.
-
-    direction : (3,), kept but for its length
-    alignment : (3,), projected onto the plane across direction
-    Both of any length > 0 whose square neither under- nor overflows, not parallel. The projection is
-    (d x alignment) x d, which is perpendicular to d to rounding even where the two are nearly parallel.
-    """
-    d = direction / ca.sqrt(ca.sumsqr(direction))
-    across = ca.cross(ca.cross(d, alignment), d)
-    a = across / ca.sqrt(ca.sumsqr(across))
-    return ca.horzcat(d, a, ca.cross(d, a))
-
-
-def mated_pose(parent: tuple[ca.SX, ca.SX], child: tuple[ca.SX, ca.SX]) -> Pose:
-    """Returns the pose of the child vessel in the parent's axes.
-
-    parent, child : position (3,) [m] and axes (3, 3) of the mated ports, each in its own vessel's axes
-    Source: [CV] eqs. (8), (9): R d_child = -d_parent, R a_child = a_parent, ports at one point.
-    """
-    (position_parent, axes_parent), (position_child, axes_child) = parent, child
-    facing = ca.horzcat(-axes_parent[:, 0], axes_parent[:, 1], -axes_parent[:, 2])
-    rotation = facing @ axes_child.T
-    return Pose(rotation, position_parent - rotation @ position_child)
+    def pose_of(self, vessel: str) -> Pose:
+        """Returns the pose of one of its vessels in the root vessel's axes."""
+        return self.pose.then(self.inside[vessel])
 
 
 def composite_body(scene: Scene, lookup: Lookup) -> Body:
@@ -98,7 +45,7 @@ def composite_body(scene: Scene, lookup: Lookup) -> Body:
     """
     bodies = []
     for number, group in enumerate(placed_groups(scene, lookup)):
-        lumped = _lump([vessel_body(scene, name, lookup, pose) for name, pose in group.inside.items()])
+        lumped = _lumped(scene, group.inside, lookup)
         if number > 0:
             pose = group.pose
             lumped = [b.seen_from(pose.rotation, pose.origin, pose.velocity, pose.rate) for b in lumped]
@@ -115,7 +62,7 @@ def composite_body(scene: Scene, lookup: Lookup) -> Body:
 def placed_groups(scene: Scene, lookup: Lookup) -> list[PlacedGroup]:
     """Returns the rigid groups of a scene, the root's own first."""
     parts = groups(scene)
-    inside = [_inside(scene, part, lookup) for part in parts]
+    inside = places(scene, parts)
     pose_by = _placing(scene, lookup, inside)
     placed = []
     for number, alternatives in enumerate(ways(scene, parts)):
@@ -132,15 +79,7 @@ def placed_groups(scene: Scene, lookup: Lookup) -> list[PlacedGroup]:
     return placed
 
 
-def _inside(scene: Scene, part: Group, lookup: Lookup) -> dict[str, Pose]:
-    """Returns the poses of a group's vessels in its own axes."""
-    poses = {part.reference: Pose(constant(np.eye(3)), constant(np.zeros(3)))}
-    for joint in part.joints:
-        poses[joint.child] = poses[joint.parent].then(_joint_pose(scene, joint, lookup))
-    return poses
-
-
-def _placing(scene: Scene, lookup: Lookup, inside: Sequence[dict[str, Pose]]) -> Callable[[Way], Pose]:
+def _placing(scene: Scene, lookup: Lookup, inside: Sequence[Places]) -> Callable[[Way], Pose]:
     """Returns the function that gives a group's pose by one way.
 
     inside : poses of the vessels of each group in its axes
@@ -190,19 +129,21 @@ def _chosen(flags: Sequence[ca.SX], poses: Sequence[Pose]) -> tuple[ca.SX, Pose]
     return attached, Pose(rotation, origin, pick(velocities), pick(rates))
 
 
-def _lump(bodies: list[Body]) -> list[Body]:
-    """Returns bodies with those of constant mass combined, first of all; those without mass are left out."""
-    constants = [body for body in bodies if body.mass.is_constant() and not body.mass.is_zero()]
-    constants.sort(key=lambda body: -float(body.mass))
-    fixed = [body for body in constants if body.inertia.is_constant()]
-    others = [body for body in bodies if not body.mass.is_constant()]
-    return (
-        ([combine(fixed)] if fixed else []) + [b for b in constants if not b.inertia.is_constant()] + others
-    )
+def _lumped(scene: Scene, inside: Places, lookup: Lookup) -> list[Body]:
+    """Returns the vessels of a group in its axes: those that are constant as one body, before the others.
 
-
-def constant(value: ArrayLike) -> ca.SX:
-    return ca.densify(ca.SX(ca.DM(np.asarray(value, dtype=float))))
+    The heaviest stand first, those whose mass is an input last; those without mass are left out.
+    """
+    of_mass, of_moments = set(scene.inputs.mass), set(scene.inputs.pmi)
+    known = [name for name in inside if name not in of_mass and scene.vessels[name].mass > 0.0]
+    known.sort(key=lambda name: -scene.vessels[name].mass)
+    fixed = {name: inside[name] for name in known if name not in of_moments}
+    varying = [name for name in known if name in of_moments] + [name for name in inside if name in of_mass]
+    bodies = [vessel_body(scene, name, lookup, inside[name]) for name in varying]
+    if not fixed:
+        return bodies
+    mass, centre, inertia = lump(scene, fixed)
+    return [Body(constant(mass), constant(centre), constant(inertia)), *bodies]
 
 
 def _joint_pose(scene: Scene, joint: Joint, lookup: Lookup) -> Pose:
@@ -260,15 +201,9 @@ def _port(scene: Scene, name: str, lookup: Lookup) -> tuple[ca.SX, ca.SX]:
     port = scene.port(name)
     position = lookup(f"{name}.position", port.position)
     direction, alignment = (
-        lookup(f"{name}.{key}", _scaled(getattr(port, key))) for key in ("direction", "alignment")
+        lookup(f"{name}.{key}", scaled(getattr(port, key))) for key in ("direction", "alignment")
     )
     return position, port_axes(direction, alignment)
-
-
-def _scaled(vector: Vector) -> ArrayLike:
-    """Returns a vector scaled by a power of two, exactly, to a length between 1/2 and 2."""
-    _, exponent = frexp(max(map(abs, vector)))
-    return [ldexp(component, -exponent) for component in vector]
 
 
 def vessel_body(scene: Scene, name: str, lookup: Lookup, pose: Pose) -> Body:
@@ -280,6 +215,4 @@ def vessel_body(scene: Scene, name: str, lookup: Lookup, pose: Pose) -> Body:
         specific_inertia = ca.diag(orbiter_moments(pmi) if scene.convention == "orbiter" else pmi)
     else:
         specific_inertia = constant(vessel.specific_inertia)
-    centre = constant(vessel.centre_of_mass)
-    specific = congruence(pose.rotation, specific_inertia)
-    return Body(mass, pose.origin + pose.rotation @ centre, mass * specific)
+    return placed_body(mass, specific_inertia, constant(vessel.centre_of_mass), pose.rotation, pose.origin)

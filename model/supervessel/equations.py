@@ -28,7 +28,7 @@ from supervessel.propagators.method import Motion
 from supervessel.quantities import EPSILON
 from supervessel.rotation import LAWS, principal_products
 from supervessel.scene import Scene, changes_rate, keeps_momentum
-from supervessel.variables import input_variables, output_variables, state_variables
+from supervessel.variables import input_variables, output_names, state_variables
 from supervessel.vessels import (
     action_parts,
     net_force,
@@ -254,7 +254,7 @@ def equations(scene: Scene) -> Equations:
         k_names=k_names,
         u_names=u_names,
         x_names=tuple(variable.name for variable in state_variables(scene)),
-        y_names=tuple(variable.name for variable in output_variables(scene)),
+        y_names=output_names(scene),
     )
 
 

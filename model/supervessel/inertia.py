@@ -5,8 +5,11 @@ What is constant folds to numbers as it is built; a tensor's two triangles share
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
 UPPER_TRIANGLE = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Where xx, yy, zz, xy, xz, yz stand in a tensor."""
@@ -48,6 +51,18 @@ class Body:
         """Returns the body with its mass, and so all that follows from it, times a factor."""
         spin = None if self.spin is None else factor * self.spin
         return Body(factor * self.mass, self.centre, factor * self.inertia, self.velocity, spin)
+
+
+def placed_body(mass: ca.SX, specific_inertia: ca.SX, centre: ca.SX, rotation: ca.SX, origin: ca.SX) -> Body:
+    """Returns a vessel as a body seen from other axes, in which it is at rest.
+
+    mass             : [kg]
+    specific_inertia : (3, 3) [m2], tensor about its centre of mass over its mass, vessel axes
+    centre           : (3,) [m], its centre of mass, vessel axes
+    rotation, origin : (3, 3), (3,) [m], of the vessel's axes in the other ones
+    """
+    specific = congruence(rotation, specific_inertia)
+    return Body(mass, origin + rotation @ centre, mass * specific)
 
 
 def congruence(rotation: ca.SX, inertia: ca.SX) -> ca.SX:
@@ -110,13 +125,39 @@ def combine(bodies: Sequence[Body]) -> Body:
     return Body(mass, first.centre + centre, inertia, velocity, spin)
 
 
+def combine_numbers(
+    masses: NDArray[np.float64], centres: NDArray[np.float64], inertias: NDArray[np.float64]
+) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+    """Returns mass, centre (3,) and inertia (3, 3) of n bodies at rest as `combine` does, to the last bit.
+
+    masses   : (n,) [kg]
+    centres  : (3, n) [m]
+    inertias : (3, 3, n) [kg m2]
+    Sums are cumulative ones, which add from the first to the last.
+    """
+    if len(masses) == 1:
+        return float(masses[0]), centres[:, 0], inertias[:, :, 0]
+    offsets = centres - centres[:, :1]
+    mass = np.cumsum(masses)[-1]
+    centre = np.cumsum(masses[1:] * offsets[:, 1:], axis=1)[:, -1] / mass
+    rho = offsets - centre[:, None]
+    inertia = np.empty((3, 3))
+    for i, j in UPPER_TRIANGLE:
+        terms = np.column_stack([inertias[i, j], masses * _offset_square(rho, i, j)])
+        inertia[i, j] = inertia[j, i] = np.cumsum(terms)[-1]
+    return float(mass), centres[:, 0] + centre, inertia
+
+
 def offset_tensor(d: ca.SX) -> ca.SX:
     """Returns |d|^2 E - d d^T, (3, 3)."""
     return symmetric(lambda i, j: _offset_square(d, i, j))
 
 
-def _offset_square(d: ca.SX, i: int, j: int) -> ca.SX:
-    """Returns element (i, j) of |d|^2 E - d d^T without subtracting squares."""
+def _offset_square(d: Any, i: int, j: int) -> Any:
+    """Returns element (i, j) of |d|^2 E - d d^T without subtracting squares.
+
+    d : (3,), or numbers (3, n): the element for each column
+    """
     if i != j:
         return -d[i] * d[j]
     one, other = (k for k in range(3) if k != i)

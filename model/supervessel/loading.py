@@ -106,8 +106,9 @@ def _explain(error: Any) -> list[str]:
 def _range_problems(scene: Scene) -> list[str]:
     """Returns which start values lie outside inputs.range."""
     problems = []
+    variables = input_variables(scene)
     for name, (low, high) in scene.inputs.range.items():
-        for variable in input_variables(scene):
+        for variable in variables:
             if name in (variable.name, variable.group) and not low <= variable.start <= high:
                 start = quantity(variable.start, variable.unit)
                 path = f'inputs.range."{name}" = {quantity((low, high), variable.unit)}'

@@ -4,7 +4,8 @@ Works on the raw tables of a file, so that a wrong name is reported beside a wro
 """
 
 import re
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from supervessel.problems import quantity, unknown
@@ -55,6 +56,13 @@ def _table(raw: Any, key: str) -> Mapping[str, Any]:
 def _list(raw: Any, key: str) -> list[Any]:
     value = raw.get(key) if isinstance(raw, Mapping) else None
     return list(value) if isinstance(value, list | tuple) else []
+
+
+def _repeated(names: Iterable[str]) -> Iterator[str]:
+    """Yields which names stand in a list more than once."""
+    for name, count in sorted(Counter(names).items()):
+        if count > 1:
+            yield f"{name} is listed {count} times"
 
 
 def _parts(raw: Mapping[str, Any], key: str) -> dict[str, list[str]]:
@@ -116,7 +124,7 @@ def _docks(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[s
     """Yields what keeps the docks closed at the start from making a forest, and all of them from reaching
     every vessel from the root."""
     switched = _list(_table(raw, "inputs"), "docked")
-    closed, reached = ({vessel: vessel for vessel in ports} for _ in range(2))
+    closed, reached = ({vessel: {vessel} for vessel in ports} for _ in range(2))
     taken: dict[str, str] = {}
     always: dict[str, str] = {}
     complete = True
@@ -146,12 +154,13 @@ def _docks(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[s
         elif vessels[0] == vessels[1]:
             yield f"{place}: both ports belong to {vessels[0]}; a dock joins two vessels"
         else:
-            if not open_at_start and closed[vessels[0]] == closed[vessels[1]]:
+            if not open_at_start and closed[vessels[0]] is closed[vessels[1]]:
                 joined = " and ".join(vessels)
                 yield f"{place}: {names[0]} - {names[1]} closes a loop; {joined} are joined already"
             for component in (reached,) if open_at_start else (closed, reached):
-                absorbed = component[vessels[1]]
-                component |= {v: component[vessels[0]] for v, c in component.items() if c == absorbed}
+                small, large = sorted((component[vessel] for vessel in vessels), key=len)
+                large |= small
+                component.update(dict.fromkeys(small, large))
         if not open_at_start:
             taken |= dict.fromkeys(names, f"docks[{number}]")
         if not switchable:
@@ -160,7 +169,7 @@ def _docks(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[s
 
 
 def _root(
-    raw: Mapping[str, Any], component: Mapping[str, str], ports: Mapping[str, list[str]]
+    raw: Mapping[str, Any], component: Mapping[str, set[str]], ports: Mapping[str, list[str]]
 ) -> Iterator[str]:
     root = raw.get("root")
     if not isinstance(root, str):
@@ -169,7 +178,7 @@ def _root(
         yield f"root: {unknown('vessel', root, ports)}"
         return
     for vessel, part in component.items():
-        if part != component[root]:
+        if part is not component[root]:
             yield f"vessels.{vessel}: is not reached from the root {root} by docks"
 
 
@@ -207,8 +216,7 @@ def _inputs(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[
     for key in ("mass", "pmi", "pose", "motion", "docked", "force", "vessel_torque"):
         names = [name for name in _list(inputs, key) if isinstance(name, str)]
         place = f"inputs.{key}"
-        for name in sorted({name for name in names if names.count(name) > 1}):
-            yield f"{place}: {name} is listed {names.count(name)} times"
+        yield from (f"{place}: {problem}" for problem in _repeated(names))
         for name in dict.fromkeys(names):
             problem = problem_of(key, name)
             if problem:
@@ -231,8 +239,7 @@ def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:
 
 def _outputs(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[str]:
     names = [name for name in _list(_table(raw, "outputs"), "names") if isinstance(name, str)]
-    for name in sorted({name for name in names if names.count(name) > 1}):
-        yield f"outputs.names: {name} is listed {names.count(name)} times"
+    yield from (f"outputs.names: {problem}" for problem in _repeated(names))
     for name in dict.fromkeys(names):
         vessel, dot, output = name.partition(".")
         if dot and vessel in ports and output in VESSEL_OUTPUT_NAMES:

@@ -182,6 +182,11 @@ def parameter_variables(scene: Scene) -> tuple[InputVariable, ...]:
     return (*rates, *attitude)
 
 
+def output_names(scene: Scene) -> tuple[str, ...]:
+    """Returns the names of the outputs that the scene lists, in its order, element by element."""
+    return tuple(name for group in scene.outputs.names for name, _ in _elements(group))
+
+
 def output_variables(scene: Scene) -> tuple[Variable, ...]:
     """Returns the outputs that the scene lists, in its order, vectors and tensors element by element."""
     nominal = _output_nominals(scene)

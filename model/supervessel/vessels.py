@@ -1,10 +1,13 @@
 """What single vessels do in the whole, in CasADi symbols: where forces act, and outputs of a vessel."""
 
+from collections.abc import Set
+
 import casadi as ca
 
 from supervessel.attitude import quaternion, to_inertial
-from supervessel.docking import Lookup, PlacedGroup, Pose, constant, placed_groups, vessel_body
+from supervessel.docking import Lookup, placed_groups, vessel_body
 from supervessel.inertia import Body, from_upper_triangle, offset_tensor, upper_triangle
+from supervessel.poses import Pose, constant
 from supervessel.scene import Scene
 
 
@@ -20,7 +23,9 @@ def action_parts(scene: Scene, lookup: Lookup, centre: ca.SX) -> dict[str, ca.SX
     inputs = scene.inputs
     if not (inputs.force or inputs.vessel_torque):
         return {}
-    where = _placed(scene, lookup)
+    where = _placed(
+        scene, lookup, {*(name.partition(".")[0] for name in inputs.force), *inputs.vessel_torque}
+    )
     moments, forces = [], []
     for name in inputs.force:
         pose, attached = where[name.partition(".")[0]]
@@ -84,7 +89,7 @@ def vessel_parts(scene: Scene, lookup: Lookup, whole: Body) -> dict[str, ca.SX]:
     """
     if not vessels_shown(scene):
         return {}
-    where = _placed(scene, lookup)
+    where = _placed(scene, lookup, set(vessels_shown(scene)))
     parts = {}
     for name in vessels_shown(scene):
         pose, attached = where[name]
@@ -138,10 +143,11 @@ def vessel_outputs(name: str, part: ca.SX, attitude: ca.SX, omega: ca.SX) -> dic
     }
 
 
-def _placed(scene: Scene, lookup: Lookup) -> dict[str, tuple[Pose, ca.SX | None]]:
-    """Returns each vessel's pose in the root's axes, and whether it hangs on the root (None: always)."""
-
-    def poses(group: PlacedGroup) -> dict[str, tuple[Pose, ca.SX | None]]:
-        return {name: (group.pose.then(pose), group.attached) for name, pose in group.inside.items()}
-
-    return {name: where for group in placed_groups(scene, lookup) for name, where in poses(group).items()}
+def _placed(scene: Scene, lookup: Lookup, names: Set[str]) -> dict[str, tuple[Pose, ca.SX | None]]:
+    """Returns some vessels' poses in the root's axes, and whether they hang on the root (None: always)."""
+    return {
+        name: (group.pose_of(name), group.attached)
+        for group in placed_groups(scene, lookup)
+        for name in group.inside
+        if name in names
+    }
