@@ -30,6 +30,8 @@ bench: .venv/installed-dev
 	$(BIN)/python tests/bench/run.py
 	$(BIN)/python tests/bench/propagators.py
 	$(BIN)/python tests/bench/twin.py
+	mkdir -p build
+	$(BIN)/supervessel trade examples/iss_dg.toml --duration 6000 -o build/iss_dg_trade
 
 peers: .venv-peers/installed
 	PYTHONPATH=tests .venv-peers/bin/python tests/peers/peers.py

@@ -1,15 +1,24 @@
-"""Command line: supervessel import FILE.scn [...] -o SCENE.toml, also as python -m supervessel."""
+"""Command line, also as python -m supervessel.
+
+supervessel import FILE.scn [...] -o SCENE.toml
+supervessel trade SCENE.toml [-o FOLDER] [--quick] [--duration S]
+"""
 
 import argparse
+import json
 import os
+import shutil
 import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import get_args
 
+from supervessel.loading import load_scene, parse_scene
 from supervessel.orbiter import ScenarioError, import_scenario
-from supervessel.scene import Convention
+from supervessel.problems import SceneError
+from supervessel.scene import Convention, Scene
+from supervessel.trade import TradeError, course_of, plot, study, table, write_all
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -17,6 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="supervessel", description="Rotation of docked spacecraft.")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     _add_import(commands.add_parser("import", help="make a scene file from Orbiter's files"))
+    _add_trade(commands.add_parser("trade", help="measure what accuracy costs in a scene"))
     options = parser.parse_args(arguments)
     try:
         return int(options.run(options))
@@ -76,7 +86,74 @@ def _import(options: argparse.Namespace) -> int:
     except OSError as error:
         print(f"{output}: cannot be written: {error.strerror}", file=sys.stderr)
         return 1
-    return _print_path(output)
+    return _print(str(output), "the scene is written, its path")
+
+
+def _add_trade(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Build the FMUs of a scene under every sensible law, propagator and step, fly its [experiment] with "
+        "each, compare with references, time: tables on stdout; these, a work-precision plot and all figures "
+        "in a folder. What has been flown is kept in the user's cache: the same again takes no time."
+    )
+    parser.add_argument("scene", type=Path, metavar="SCENE.toml", help="the scene file")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FOLDER", help="where files go (default: NAME_trade here)"
+    )
+    parser.add_argument("--quick", action="store_true", help="fewer laws, steps and tolerances")
+    parser.add_argument(
+        "--duration", type=float, metavar="S", help="of the experiment [s] (default: the scene's)"
+    )
+    parser.set_defaults(run=_trade)
+
+
+def _trade(options: argparse.Namespace) -> int:
+    # Package fmu_build is built on this one: looked up only here.
+    from fmu_build.errors import BuildError  # noqa: PLC0415
+
+    try:
+        scene = _lasting(load_scene(options.scene), options.duration)
+        folder: Path = options.output or Path(f"{scene.name}_trade")
+        course_of(scene)
+        write_all(folder, {})
+        found = study(scene, quick=options.quick, progress=_progress)
+        tables = table(found)
+        files = {"trade.json": json.dumps(found, indent=1).encode(), "trade.md": f"{tables}\n".encode()}
+        try:
+            files |= {f"trade.{kind}": drawn for kind, drawn in plot(found).items()}
+        except ImportError:
+            print("no plot: matplotlib is not installed, pip install 'supervessel[plot]'", file=sys.stderr)
+        write_all(folder, files)
+    except (SceneError, BuildError) as error:
+        print(error, file=sys.stderr)
+        return 1
+    except TradeError as error:
+        print(f"{options.scene.name}: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print(
+            "\ninterrupted; what has been flown is kept, the same command goes on from there", file=sys.stderr
+        )
+        return 1
+    return _print(f"{tables}\n\n{folder}", f"the trade is written to {folder}, its tables")
+
+
+def _lasting(scene: Scene, duration: float | None) -> Scene:
+    """Returns the scene with an experiment of that duration [s]; None: the scene's own."""
+    if duration is None or scene.experiment is None:
+        return scene
+    raw = scene.model_dump(exclude_none=True)
+    raw["experiment"]["duration"] = duration
+    return parse_scene(raw, "--duration")
+
+
+def _progress(done: int, total: int, what: str) -> None:
+    """Shows how far a trade has come, on a terminal only."""
+    if not sys.stderr.isatty():
+        return
+    width = shutil.get_terminal_size().columns - 1
+    bar = "#" * (24 * done // total)
+    end = "\n" if done == total else ""
+    print(f"\r{f'[{bar:.<24}] {done}/{total} {what}'[:width]:<{width}}", end=end, file=sys.stderr, flush=True)
 
 
 def _write(text: str, output: Path) -> None:
@@ -95,12 +172,12 @@ def _write(text: str, output: Path) -> None:
             raise
 
 
-def _print_path(output: Path) -> int:
-    """Prints the path of what was written; returns 0, or 1 where standard output does not take it."""
+def _print(text: str, what: str) -> int:
+    """Prints results; returns 0, or 1 where standard output does not take them; `what` names them then."""
     try:
-        print(output, flush=True)
+        print(text, flush=True)
     except (OSError, UnicodeError) as error:
-        print(f"the scene is written, its path cannot be printed: {error}", file=sys.stderr)
+        print(f"{what} cannot be printed: {error}", file=sys.stderr)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left is flushed at the end
         return 1
     return 0

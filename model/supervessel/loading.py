@@ -71,7 +71,7 @@ def parse_scene(raw: Mapping[str, Any], source: str = "scene") -> Scene:
     problems += naming_problems(raw) + consistency_problems(raw)
     if scene is None or problems:
         raise SceneError(source, problems)
-    problems += _range_problems(scene) + _composite_problems(scene)
+    problems += _range_problems(scene) + _course_problems(scene) + _composite_problems(scene)
     if problems:
         raise SceneError(source, problems)
     return scene
@@ -113,6 +113,26 @@ def _range_problems(scene: Scene) -> list[str]:
                 start = quantity(variable.start, variable.unit)
                 path = f'inputs.range."{name}" = {quantity((low, high), variable.unit)}'
                 problems.append(f"{path}: the start value {variable.name} = {start} lies outside")
+    return problems
+
+
+def _course_problems(scene: Scene) -> list[str]:
+    """Returns which values of experiment.inputs an input cannot have."""
+    problems = []
+    variables = {variable.name: variable for variable in input_variables(scene)}
+    for name, rows in scene.experiment.inputs.items() if scene.experiment else ():
+        variable, kind = variables[name], name.rpartition(".")[2].partition("[")[0]
+        low, high = variable.low, variable.high
+        allowed = f"outside inputs.range = {quantity((low, high), variable.unit)}"
+        if variable.boolean:
+            low, high, allowed = 0.0, 1.0, "must be true or false"
+        elif low is None or high is None:
+            allowed = f"a {'mass' if kind == 'mass' else 'moment'} must be >= 0 {variable.unit}"
+        for time, value in rows:
+            outside = (low is not None and value < low) or (high is not None and value > high)
+            if outside or (variable.boolean and value not in (0.0, 1.0)):
+                found = quantity(value, variable.unit)
+                problems.append(f'experiment.inputs."{name}": {found} at {time} s: {allowed}')
     return problems
 
 

@@ -43,6 +43,7 @@ def naming_problems(raw: Mapping[str, Any]) -> list[str]:
         *_docks(raw, ports),
         *_inputs(raw, ports),
         *_ranges(raw),
+        *_courses(raw),
         *_outputs(raw, ports),
     ]
 
@@ -223,11 +224,31 @@ def _inputs(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[
                 yield f"{place}: {problem}"
 
 
-def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:
+def _groups(raw: Mapping[str, Any]) -> dict[str, int]:
+    """Returns the inputs that the scene asks for: name without index -> elements (scalar: 0)."""
     inputs = _table(raw, "inputs")
     lists = {key: _list(inputs, key) for key in inputs if key != "torque"}
-    groups = input_groups(lists | {"torque": inputs.get("torque")})
-    groups = {name: size for name, size in groups.items() if not name.endswith(".docked")}
+    return input_groups(lists | {"torque": inputs.get("torque")})
+
+
+def _courses(raw: Mapping[str, Any]) -> Iterator[str]:
+    known = [
+        f"{name}[{i}]" if i else name
+        for name, size in _groups(raw).items()
+        for i in (range(1, size + 1) if size else (0,))
+    ]
+    for name, rows in _table(_table(raw, "experiment"), "inputs").items():
+        if isinstance(rows, Mapping):
+            quoted = ", ".join(f'"{name}.{key}"' for key in rows)
+            rule = "the name of an input stands in quotes here"
+            yield f"experiment.inputs.{name}: {rule}: {quoted} = [[time, value]]"
+        elif name not in known:
+            yield f"experiment.inputs: {unknown('input', name, known)}"
+
+
+def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:
+    inputs = _table(raw, "inputs")
+    groups = {name: size for name, size in _groups(raw).items() if not name.endswith(".docked")}
     known = list(groups) + [f"{name}[{i}]" for name, size in groups.items() for i in range(1, size + 1)]
     for name, bounds in _table(inputs, "range").items():
         if isinstance(bounds, Mapping):

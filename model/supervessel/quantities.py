@@ -1,6 +1,7 @@
 """Numbers as a scene may write them, and the inequalities that a mass distribution obeys."""
 
 import math
+from itertools import pairwise
 from typing import Annotated, Any
 
 import numpy as np
@@ -124,6 +125,30 @@ def _direction(value: Any) -> Vector:
     return x, y, z
 
 
+def _course(value: object) -> tuple[tuple[float, float], ...]:
+    """Returns how an input moves: rows of time [s] and value; two at one time are a jump."""
+    where = f" = {quantity(value)}: must be "
+    if not (isinstance(value, list | tuple) and value and all(map(_is_row, value))):
+        raise ValueError(where + "rows [time in s, value] of finite numbers, at least one")
+    rows = tuple((float(time), float(number)) for time, number in value)
+    times = [time for time, _ in rows]
+    if times[0] < 0.0:
+        raise ValueError(f"{where}from time 0 s on, but begins at {times[0]} s")
+    for i, (one, other) in enumerate(pairwise(times), start=2):
+        if other < one:
+            raise ValueError(f"{where}in the order of time, but row {i}, at {other} s, follows {one} s")
+        if i > 2 and other == times[i - 3]:
+            raise ValueError(f"{where}at most two values at one time, but has three at {other} s")
+    return rows
+
+
+def _is_row(row: object) -> bool:
+    """Whether this is a time and a value; a value may be true or false."""
+    if not (isinstance(row, list | tuple) and len(row) == 2 and is_number(row[0])):
+        return False
+    return isinstance(row[1], bool) or is_number(row[1])
+
+
 Mass = Annotated[float, number("kg", "a finite number >= 0", 0.0)]
 Pmi = Annotated[Vector, vector("m2", "three finite numbers >= 0", low=0.0)]
 Tensor = Annotated[Matrix, BeforeValidator(_tensor)]
@@ -137,6 +162,7 @@ AngularVelocity = Annotated[Vector, vector("rad/s", "three finite numbers")]
 Seconds = Annotated[float, number("s", "a finite number > 0", 0.0, open_low=True)]
 Angle = Annotated[float, number("rad", "a number from 1e-6 to 1", 1e-6, 1.0)]
 Tolerance = Annotated[float, number("", "a number from 1e-15 to 0.1", 1e-15, 0.1)]
+Course = Annotated[tuple[tuple[float, float], ...], BeforeValidator(_course)]
 Bounds = Annotated[tuple[float, float], vector("", "two finite numbers [low, high]", size=2)]
 
 

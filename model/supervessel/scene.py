@@ -15,6 +15,7 @@ from supervessel.quantities import (
     AngularVelocity,
     Attitude,
     Bounds,
+    Course,
     Direction,
     Mass,
     Matrix,
@@ -211,10 +212,15 @@ class Rotation(Table):
 
 
 class Experiment(Table):
-    """The default experiment: duration [s] and communication step [s]."""
+    """The default experiment: duration [s], communication step [s]; what `supervessel trade` flies.
+
+    inputs : rows of time [s] and value by an input's name; linear between them, held before the first and
+             after the last, jumping where two have the same time. Others keep the scene's values.
+    """
 
     duration: Seconds
     step: Seconds
+    inputs: dict[str, Course] = Field(default_factory=dict)
 
 
 class Outputs(Table):

@@ -1,0 +1,287 @@
+"""Choices built, flown in processes of their own, and kept by content."""
+
+import hashlib
+import json
+import platform
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supervessel.scene import Scene
+from supervessel.trade.choices import SHOWN, Choice, variant_of
+from supervessel.trade.experiment import Course, TradeError, course_of
+
+Array = NDArray[np.float64]
+
+HERE = Path(__file__).parent
+
+TIMING = 0.25
+"""Seconds that the clock may take of a flight; a flight that takes longer is timed once."""
+
+TIME_LIMIT = 300.0
+"""Seconds after which a flight is given up."""
+
+OUT_OF_TIME = f"did not end within {TIME_LIMIT:g} s"
+
+BUILT_WITH = ("casadi", "fmpy", "ziglang")
+"""Packages that results depend on."""
+
+AT_ONCE = 2
+"""Builds at the same time."""
+
+
+@dataclass(frozen=True)
+class Flown:
+    """What came of a choice.
+
+    refused     : why it could not be flown, or None; then the others are 0 and empty
+    nanoseconds : of a communication step: moving inputs set, step, attitude and rate got
+    ratio       : of that to a plain RK4 step, timed in turn with it
+    sub_steps   : of the whole flight
+    size        : of the library [bytes]
+    samples     : attitude and angular velocity, (n, 7), at the course's samples
+    """
+
+    refused: str | None
+    nanoseconds: float
+    ratio: float
+    sub_steps: int
+    size: int
+    samples: Array
+
+
+@dataclass(frozen=True)
+class _Built:
+    """A choice's library, and what must be known to call it."""
+
+    library: Path
+    token: str
+    references: dict[str, int]
+
+
+def fly_all(scene: Scene, choices: Sequence[Choice], done: Callable[[str], None]) -> dict[Choice, Flown]:
+    """Returns what came of choices; those not flown before are built, two at a time, then flown one by one.
+
+    done : told of each that is finished
+    Each result is kept as soon as it is there. Raises TradeError if one cannot be kept, BuildError if the
+    compiler fails.
+    """
+    course = course_of(scene)
+    places = {choice: _place(scene, choice) for choice in choices}
+    found: dict[Choice, Flown] = {}
+    for choice, place in places.items():
+        kept = _read(place)
+        if kept is not None:
+            found[choice] = kept
+            done(str(choice))
+    missing = [choice for choice in choices if choice not in found]
+    if not missing:
+        return found
+    with tempfile.TemporaryDirectory(prefix="supervessel-") as name:
+        folder = Path(name)
+        try:
+            host = _host(folder)
+            built = _build_all(scene, missing, folder, done)
+            for choice in missing:
+                found[choice] = _fly(built[choice], host, choice, course, folder)
+                if found[choice].refused != OUT_OF_TIME:  # another time there may be more of it
+                    _keep(places[choice], found[choice])
+                done(str(choice))
+        except OSError as error:
+            raise TradeError(f"{error.filename or folder}: no room to work in: {error.strerror}") from None
+    return found
+
+
+def _build_all(
+    scene: Scene, choices: Sequence[Choice], folder: Path, done: Callable[[str], None]
+) -> dict[Choice, _Built]:
+    """Returns libraries; choices that differ in tolerance alone share one."""
+    sources = {choice: _source_of(choice) for choice in choices}
+    names = {source: f"b{i}" for i, source in enumerate(dict.fromkeys(sources.values()))}
+    pool = ThreadPoolExecutor(AT_ONCE)
+    try:
+        futures = {
+            source: pool.submit(_build, variant_of(scene, source), folder / name)
+            for source, name in names.items()
+        }
+        built = {}
+        for source, future in futures.items():
+            built[source] = future.result()
+            done(f"build {source}")
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return {choice: built[source] for choice, source in sources.items()}
+
+
+def _source_of(choice: Choice) -> Choice:
+    """Returns the choice whose library this one is flown with."""
+    return Choice(choice.model, choice.propagator, choice.angle)
+
+
+def builds(choices: Sequence[Choice]) -> int:
+    """Returns how many libraries choices need."""
+    return len({_source_of(choice) for choice in choices})
+
+
+def _build(scene: Scene, folder: Path) -> _Built:
+    """Returns the library of a scene's FMU."""
+    # Package fmu_build is built on this one: looked up only here.
+    from fmu_build.build import compile_sources, generate  # noqa: PLC0415
+    from fmu_build.platforms import host_platform  # noqa: PLC0415
+    from fmu_build.sources import source_file_names, source_files  # noqa: PLC0415
+
+    sources, description = generate(scene, 3)
+    packed = source_files(sources, 3, scene.name)
+    names = source_file_names(sources, 3)
+    [(path, library)] = compile_sources(packed, names, 3, (host_platform(),), scene.name).items()
+    file = folder / Path(path).name
+    folder.mkdir()
+    file.write_bytes(library)
+    root = ET.fromstring(description)
+    variables = root.find("ModelVariables")
+    assert variables is not None
+    references = {v.attrib["name"]: int(v.attrib["valueReference"]) for v in variables}
+    return _Built(file, root.attrib["instantiationToken"], references)
+
+
+def _host(folder: Path) -> Path:
+    """Returns host.c as a library."""
+    from fmu_build.compiler import compile_library  # noqa: PLC0415
+    from fmu_build.platforms import host_platform  # noqa: PLC0415
+
+    host = host_platform()
+    library = folder / f"host{host.suffix}"
+    compile_library([HERE / "host.c"], host, library)
+    return library
+
+
+def _fly(built: _Built, host: Path, choice: Choice, course: Course, folder: Path) -> Flown:
+    """Returns what came of a flight in a process of its own."""
+    moving = {name: v for name, v in course.numbers.items() if _is_input(built, choice, name)}
+    numbers, booleans = folder / "numbers", folder / "booleans"
+    numbers.write_bytes(_columns(moving, course.steps, np.dtype(np.float64)))
+    booleans.write_bytes(_columns(course.booleans, course.steps, np.dtype(np.bool_)))
+    shown = [f"{name}[{i}]" for name, n in zip(SHOWN, (4, 3), strict=True) for i in range(1, n + 1)]
+    job = {
+        "host": str(host),
+        "library": str(built.library),
+        "token": built.token,
+        "tolerance": choice.tolerance or 0.0,
+        "size": course.size,
+        "last_size": course.last_size,
+        "steps": course.steps,
+        "number_references": [built.references[name] for name in moving],
+        "boolean_references": [built.references[name] for name in course.booleans],
+        "shown": [built.references[name] for name in shown],
+        "numbers": str(numbers),
+        "booleans": str(booleans),
+        "sampled": course.sampled.tolist(),
+        "seconds": TIMING,
+    }
+    (folder / "job.json").write_text(json.dumps(job))
+    command = [sys.executable, "-I", str(HERE / "host.py"), str(folder / "job.json")]
+    try:
+        ended = subprocess.run(command, capture_output=True, text=True, timeout=TIME_LIMIT, check=False)
+    except subprocess.TimeoutExpired:
+        return _refused(OUT_OF_TIME)
+    if ended.returncode != 0:
+        last = (ended.stderr.strip().splitlines() or ["nothing was said"])[-1]
+        raise TradeError(f"{choice}: its flight ended with status {ended.returncode}: {last}")
+    answer = json.loads(ended.stdout)
+    if answer["refused"] is not None:
+        return _refused(answer["refused"])
+    return Flown(
+        None,
+        answer["nanoseconds"],
+        answer["ratio"],
+        answer["sub_steps"],
+        built.library.stat().st_size,
+        np.array(answer["samples"]).reshape(-1, 7),
+    )
+
+
+def _is_input(built: _Built, choice: Choice, name: str) -> bool:
+    """Whether an input is left; only those of what is frozen are not."""
+    return name in built.references or not choice.model.frozen
+
+
+def _columns(values: dict[str, Array], steps: int, kind: np.dtype[Any]) -> bytes:
+    """Returns inputs step by step."""
+    return np.column_stack(list(values.values())).astype(kind).tobytes() if values else bytes(steps and 1)
+
+
+def _refused(reason: str) -> Flown:
+    return Flown(reason, 0.0, 0.0, 0, 0, np.zeros((0, 7)))
+
+
+# What has been flown is kept under a name that says everything that it depends on.
+
+
+def _place(scene: Scene, choice: Choice) -> Path:
+    from fmu_build.compiler import compiler_cache  # noqa: PLC0415
+
+    said = json.dumps([scene.model_dump(mode="json"), asdict(choice), _maker()], sort_keys=True)
+    return compiler_cache() / "trade" / f"{hashlib.sha256(said.encode()).hexdigest()}.json"
+
+
+@cache
+def _maker() -> list[str]:
+    """Returns what turns a choice into a result: this machine, versions, our own files."""
+    import fmu_build  # noqa: PLC0415
+
+    files = hashlib.sha256()
+    for package in (HERE.parent, Path(fmu_build.__path__[0])):
+        for file in sorted(package.rglob("*")):
+            if file.suffix in (".py", ".c", ".h"):
+                files.update(f"{file.relative_to(package)}\n".encode() + file.read_bytes())
+    versions = [version(name) for name in BUILT_WITH]
+    return [platform.node(), platform.machine(), platform.system(), *versions, files.hexdigest()]
+
+
+def _read(place: Path) -> Flown | None:
+    """Returns a kept result, None where there is none that is whole."""
+    try:
+        kept = json.loads(place.read_text())
+    except (OSError, ValueError):
+        return None
+    return Flown(**(kept | {"samples": np.array(kept["samples"]).reshape(-1, 7)}))
+
+
+def _keep(place: Path, flown: Flown) -> None:
+    """Keeps a result; the file appears when it is whole."""
+    write_whole(place, json.dumps(asdict(flown) | {"samples": flown.samples.tolist()}).encode())
+
+
+def write_whole(file: Path, content: bytes) -> None:
+    """Writes a file, which appears when it is whole. Raises TradeError if it cannot be written."""
+    write_all(file.parent, {file.name: content})
+
+
+def write_all(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Writes files into a folder, made if need be; none appears before all are whole. Raises TradeError."""
+    parts: dict[str, Path] = {}
+    try:
+        folder.mkdir(exist_ok=True)
+        for name, content in files.items():
+            with tempfile.NamedTemporaryFile(dir=folder, prefix=".trade-", delete=False) as stream:
+                parts[name] = Path(stream.name)
+                stream.write(content)
+            parts[name].chmod(0o644)
+        for name, part in parts.items():
+            part.replace(folder / name)
+    except OSError as error:
+        raise TradeError(f"{folder}: cannot be written: {error.strerror}") from None
+    finally:
+        for part in parts.values():
+            part.unlink(missing_ok=True)

@@ -1,0 +1,181 @@
+"""A trade as tables, in Markdown, and as a plot."""
+
+import io
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from supervessel.trade.choices import label
+
+ENOUGH = 1e-9
+"""Integration error [rad] from which on a model's cheapest choice is quoted."""
+
+
+def table(trade: Mapping[str, Any]) -> str:
+    """Returns both tables of a trade: what each model leaves out, and what each choice costs."""
+    same = [
+        f"{label(model)}: the same as {', '.join(model['same'])}"
+        for model in trade["models"]
+        if model["same"]
+    ]
+    refused = [f"{one['choice']}: refused {one['reason']}" for one in trade["refused"]]
+    notes = [
+        f"Two references of the best model are {_brief(trade['doubt']['attitude'][-1])} rad and "
+        f"{_brief(trade['doubt']['rate'][-1])} rad/s apart: less than that is not told.",
+        *same,
+        *refused,
+    ]
+    parts = [
+        f"{trade['scene']}: {trade['experiment']['duration']:g} s in {trade['steps']} steps",
+        drift_table(trade),
+        choices_table(trade),
+        "\n".join(notes),
+    ]
+    return "\n\n".join(parts)
+
+
+def drift_table(trade: Mapping[str, Any]) -> str:
+    """Returns how far each model has turned away from the best one by each horizon, and what it costs.
+
+    The cost is that of the cheapest choice whose integration error is at most ENOUGH, or of the most exact.
+    """
+    horizons = [f"{horizon:g} s" for horizon in trade["horizons"]]
+    lines = _heading(
+        ["model", *(f"off by [rad] after {h}" for h in horizons), "cheapest", "us per s", "plain RK4 steps"],
+        1,
+    )
+    best = trade["models"][-1]
+    for model in trade["models"]:
+        cheapest = _cheapest(model, trade["choices"])
+        off = [
+            "-" if model is best else _brief(x, doubt)
+            for x, doubt in zip(model["attitude"], trade["doubt"]["attitude"], strict=True)
+        ]
+        cost = ["-", "-", "-"]
+        if cheapest is not None:
+            cost = [
+                _name(cheapest),
+                f"{cheapest['us_per_second']:.3g}",
+                f"{cheapest['rk4_steps_per_step']:.2g}",
+            ]
+        lines.append(_line([label(model), *off, *cost]))
+    return "\n".join(lines)
+
+
+def _cheapest(model: Mapping[str, Any], choices: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    own = [row for row in choices if label(row) == label(model)]
+    enough = [row for row in own if row["integration_attitude"] <= ENOUGH]
+    if enough:
+        return min(enough, key=lambda row: float(row["rk4_steps_per_step"]))
+    return min(own, key=lambda row: float(row["integration_attitude"]), default=None)
+
+
+def choices_table(trade: Mapping[str, Any]) -> str:
+    """Returns what each choice errs by and costs; the Pareto front is marked."""
+    lines = _heading(
+        [
+            "model",
+            "propagator",
+            "error [rad]",
+            "of integration [rad]",
+            "of rate [rad/s]",
+            "of integration [rad/s]",
+            "sub-steps per step",
+            "ns per step",
+            "us per s",
+            "plain RK4 steps",
+            "bytes",
+            "Pareto",
+        ],
+        2,
+    )
+    for row in trade["choices"]:
+        lines.append(
+            _line(
+                [
+                    label(row),
+                    _name(row),
+                    *(
+                        _brief(row[f"{part}{key}"], trade["doubt"][key][-1])
+                        for key in ("attitude", "rate")
+                        for part in ("", "integration_")
+                    ),
+                    f"{row['sub_steps'] / trade['steps']:.3g}",
+                    f"{row['ns_per_step']:.0f}",
+                    f"{row['us_per_second']:.3g}",
+                    f"{row['rk4_steps_per_step']:.2g}",
+                    str(row["bytes"]),
+                    "*" if row["pareto"] else "",
+                ]
+            )
+        )
+    return "\n".join(lines)
+
+
+def _name(row: Mapping[str, Any]) -> str:
+    """Returns a choice's propagator with its settings: the ends, where several are the same."""
+    settings = sorted(row["settings"], key=float)
+    ends = settings if len(settings) < 2 else [f"{settings[0]} to {settings[-1]}"]
+    return " ".join([f"`{row['propagator']}`", *ends])
+
+
+def _heading(names: Sequence[str], words: int) -> list[str]:
+    return [_line(names), "|" + "---|" * words + "---:|" * (len(names) - words)]
+
+
+def _line(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cells) + " |"
+
+
+def _brief(error: float, doubt: float = 0.0) -> str:
+    """Returns an error in two digits, one below the doubt as that."""
+    if error < doubt:
+        return f"< {doubt:.0e}"
+    return f"{error:.1e}" if error else "0"
+
+
+MARKERS = {"rk4": "o", "dop853": "s", "taylor": "D", "auto": "^", "split": "v", "exact": "P"}
+
+
+def plot(trade: Mapping[str, Any]) -> dict[str, bytes]:
+    """Returns the work-precision plot as "svg" and "png". Raises ImportError without matplotlib."""
+    from matplotlib import rc_context  # noqa: PLC0415
+    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
+    from matplotlib.backends.backend_svg import FigureCanvasSVG  # noqa: PLC0415
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    figure = Figure(figsize=(10.0, 6.0), layout="constrained")
+    axes = figure.add_subplot()
+    models = [label(model) for model in trade["models"]]
+    floor = trade["doubt"]["attitude"][-1]
+
+    def draw(rows: Sequence[Mapping[str, Any]], style: str, **options: Any) -> None:
+        costs = [row["rk4_steps_per_step"] for row in rows]
+        axes.plot(costs, [max(row["attitude"], floor) for row in rows], style, **options)
+
+    for name, marker in MARKERS.items():
+        for i, model in enumerate(models):
+            rows = [row for row in trade["choices"] if row["propagator"] == name and label(row) == model]
+            if rows:
+                draw(rows, f"{marker}-", color=f"C{i}", label=f"{model}, {name}", alpha=0.7, lw=0.6)
+    front = [row for row in trade["choices"] if row["pareto"]]
+    front.sort(key=lambda row: float(row["rk4_steps_per_step"]))
+    draw(front, "k--", lw=0.8, drawstyle="steps-post", label="Pareto front")
+    axes.axhline(floor, color="grey", ls=":", label="references' doubt")
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xlabel=f"cost of a step of {trade['experiment']['step']:g} s [plain RK4 steps]",
+        ylabel=f"largest error of the attitude in {trade['horizons'][-1]:g} s [rad]",
+        title=trade["scene"],
+    )
+    axes.grid(alpha=0.3)
+    figure.legend(fontsize="x-small", loc="outside right upper")
+    drawn = {}
+    with rc_context({"svg.hashsalt": trade["scene"]}):
+        for kind, canvas in (("svg", FigureCanvasSVG(figure)), ("png", FigureCanvasAgg(figure))):
+            stream = io.BytesIO()
+            canvas.print_figure(
+                stream, format=kind, dpi=120, metadata={"Date": None} if kind == "svg" else None
+            )
+            drawn[kind] = stream.getvalue()
+    return drawn

@@ -1,0 +1,11 @@
+"""A cache of the tests' own: nothing has been flown before, and the compiler starts cold once."""
+
+import pytest
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cache(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("cache")
+        patch.setenv("SUPERVESSEL_CACHE", str(folder))
+        yield folder

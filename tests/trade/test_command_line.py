@@ -1,0 +1,180 @@
+"""`supervessel trade`: what it prints and leaves, what it refuses, and that an interrupt loses nothing."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from supervessel.trade import table
+
+ROOT = Path(__file__).parents[2]
+
+SCENE = """\
+name = "ball"
+root = "B"
+[vessels.B]
+mass = 2.0
+pmi = [1.0, 1.5, 2.0]
+[rotation]
+angular_velocity = [0.1, 0.2, 0.3]
+[experiment]
+duration = 10.0
+step = 1.0
+"""
+
+FILES = ["trade.json", "trade.md", "trade.png", "trade.svg"]
+
+needs_posix = pytest.mark.skipif(os.name != "posix", reason="needs signals and ulimit")
+
+
+def command(*arguments):
+    return [sys.executable, "-m", "supervessel", "trade", *map(str, arguments)]
+
+
+def environment(cache):
+    path = os.pathsep.join((str(ROOT), str(ROOT / "model")))
+    return os.environ | {"PYTHONPATH": path, "SUPERVESSEL_CACHE": str(cache)}
+
+
+def run(folder, cache, *arguments):
+    return subprocess.run(
+        command(*arguments), cwd=folder, env=environment(cache), capture_output=True, text=True, check=False
+    )
+
+
+def files(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+@pytest.fixture(scope="module")
+def interrupted(tmp_path_factory, cache):
+    """A trade interrupted when it has its first results: its end, its folder, and what it has kept."""
+    folder = tmp_path_factory.mktemp("work")
+    (folder / "ball.toml").write_text(SCENE)
+    before = set(cache.glob("trade/*"))
+    running = subprocess.Popen(
+        command("ball.toml", "--quick", "-o", "out"),
+        cwd=folder,
+        env=environment(cache),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    while running.poll() is None and not set(cache.glob("trade/*.json")) - before:
+        time.sleep(0.05)
+    running.send_signal(signal.SIGINT)
+    out, error = running.communicate()
+    kept = {path.name: path.read_bytes() for path in set(cache.glob("trade/*")) - before}
+    done = subprocess.CompletedProcess(running.args, running.returncode, out, error)
+    return done, files(folder / "out"), kept
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory, cache, interrupted):
+    """The same trade from its beginning: its end and its folder."""
+    folder = tmp_path_factory.mktemp("work")
+    (folder / "ball.toml").write_text(SCENE)
+    return run(folder, cache, "ball.toml", "--quick", "-o", "out"), folder
+
+
+@needs_posix
+def test_an_interrupt_leaves_no_files_and_keeps_whole_results(interrupted):
+    done, left, kept = interrupted
+    message = "interrupted; what has been flown is kept, the same command goes on from there"
+    assert (done.returncode, done.stdout, done.stderr.strip()) == (1, "", message)
+    assert left == []
+    assert kept
+    for name, content in kept.items():
+        assert name.endswith(".json")
+        assert len(json.loads(content)["samples"]) == 10  # each of ten steps
+
+
+@needs_posix
+def test_the_same_command_goes_on_from_what_was_kept(interrupted, finished, cache):
+    done, _ = finished
+    assert done.returncode == 0, done.stderr
+    for name, content in interrupted[2].items():
+        assert (cache / "trade" / name).read_bytes() == content
+    assert len(list(cache.glob("trade/*"))) > len(interrupted[2])
+
+
+def test_tables_are_printed_and_all_is_in_the_folder(finished):
+    done, folder = finished
+    assert (done.returncode, done.stderr) == (0, "")
+    assert files(folder / "out") == FILES
+    found = json.loads((folder / "out" / "trade.json").read_text())
+    assert done.stdout == f"{table(found)}\n\nout\n"
+    assert (folder / "out" / "trade.md").read_text() == f"{table(found)}\n"
+    assert found["experiment"] == {"duration": 10.0, "step": 1.0, "inputs": {}}
+
+
+def test_a_second_call_gives_the_same_bytes(finished, cache):
+    _, folder = finished
+    before = {name: (folder / "out" / name).read_bytes() for name in FILES}
+    again = run(folder, cache, "ball.toml", "--quick", "-o", "again")
+    assert again.returncode == 0, again.stderr
+    assert {name: (folder / "again" / name).read_bytes() for name in FILES} == before
+
+
+@needs_posix
+def test_a_full_disk_leaves_the_old_files_as_they_are(finished, cache):
+    _, folder = finished
+    before = {name: (folder / "out" / name).read_bytes() for name in FILES}
+    limited = f"ulimit -f 8 && exec {' '.join(command('ball.toml', '--quick', '-o', 'out'))}"
+    done = subprocess.run(
+        ["sh", "-c", limited], cwd=folder, env=environment(cache), capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr == "ball.toml: out: cannot be written: File too large\n"
+    assert {path.name: path.read_bytes() for path in (folder / "out").iterdir()} == before
+
+
+@pytest.mark.parametrize(
+    ("change", "arguments", "status", "message"),
+    [
+        (
+            ("[experiment]\nduration = 10.0\nstep = 1.0\n", ""),
+            (),
+            1,
+            "ball.toml: experiment: missing; a trade needs [experiment] with duration and step [s]\n",
+        ),
+        (
+            ("duration = 10.0", "duration = 0.0"),
+            (),
+            1,
+            "ball.toml: experiment.duration = 0.0 s: must be a finite number > 0\n",
+        ),
+        (
+            ("", ""),
+            ("--duration", "0"),
+            1,
+            "--duration: experiment.duration = 0.0 s: must be a finite number > 0\n",
+        ),
+        (
+            ("", ""),
+            ("--duration", "1e9"),
+            1,
+            "ball.toml: experiment: duration = 1000000000.0 s in steps of 1.0 s are 1e+09 steps; "
+            "at most 1000000\n",
+        ),
+        (("", ""), ("--duration", "long"), 2, "argument --duration: invalid float value: 'long'\n"),
+        (
+            ("", ""),
+            ("-o", "ball.toml/out"),
+            1,
+            "ball.toml: ball.toml/out: cannot be written: Not a directory\n",
+        ),
+    ],
+)
+def test_what_cannot_be_done_is_said_before_any_work(tmp_path, change, arguments, status, message):
+    (tmp_path / "ball.toml").write_text(SCENE.replace(*change))
+    done = run(tmp_path, tmp_path / "cache", "ball.toml", *arguments)
+    assert files(tmp_path) == ["ball.toml"]
+    assert (done.returncode, done.stdout) == (status, "")
+    assert done.stderr.endswith(message)
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,97 @@
+"""The native host flies as an importer does: set, step, get, to the last bit."""
+
+import numpy as np
+import pytest
+
+from supervessel import parse_scene
+from supervessel.trade.choices import BEST, Choice, Model, models, reference_choices, variant_of
+from supervessel.trade.experiment import course_of
+from supervessel.trade.flight import fly_all
+from support import ISS_DG, OK, Instance, variant
+
+COURSES = {
+    "berth.docked": [[0, True], [3, False], [6, True]],
+    "berth.rate[2]": [[0, 0.01]],
+    "DG.mass": [[0, 24000], [8, 12000]],
+    "torque[1]": [[0, 0], [2, 3e4], [2, -1e4]],
+    "torque[3]": [[5, 2e4]],
+}
+
+DOCKING = variant(
+    ISS_DG,
+    {
+        "name": "watched",
+        "docks": [{"name": "berth", "ports": ["ISS.P2", "DG.nose"]}],
+        "inputs": {"mass": ["DG"], "docked": ["berth"], "torque": True},
+        "rotation": {"propagator": "dop853", "angular_velocity": [0.01, 0.02, -0.03]},
+        "experiment": {"duration": 9.5, "step": 1.0, "inputs": COURSES},
+    },
+)
+"""A ship that burns fuel, leaves and comes back while torque acts; the last step is half as long."""
+
+
+def test_the_host_flies_what_an_importer_flies():
+    scene = parse_scene(DOCKING)
+    choice = Choice(BEST, "dop853", None, 1e-7)
+    flown = fly_all(scene, [choice], lambda _: None)[choice]
+    course = course_of(scene)
+    instance = Instance(variant(DOCKING, {"rotation.tolerance": 1e-7}))
+    try:
+        for i in range(course.steps):
+            held = {name: float(v[i]) for name, v in course.numbers.items()}
+            held |= {name: bool(v[i]) for name, v in course.booleans.items()}
+            if i == 0:
+                instance.enter()
+            assert instance.set(held) == OK, instance.log
+            if i == 0:
+                assert instance.exit() == OK, instance.log
+            assert instance.step(course.size if i + 1 < course.steps else course.last_size) == OK, (
+                instance.log
+            )
+            shown = [*instance.get("attitude"), *instance.get("angular_velocity")]
+            assert shown == flown.samples[i].tolist(), i
+    finally:
+        instance.free()
+    assert np.abs(np.diff(flown.samples[:, 4:], axis=0)).max() > 1e-4  # it did turn, and dock
+    assert course.booleans["berth.docked"].tolist() == [1, 1, 1, 0, 0, 0, 1, 1, 1, 1]
+
+
+def test_sub_steps_are_counted():
+    """rk4 divides a step of 1 s at 1 rad/s, about a principal axis, into 20 sub-steps of at most 0.05 rad.
+
+    The bound of the rate exceeds the rate by up to exp(0.05/(3 sqrt 3)) - 1 = 1 %: 21 are taken.
+    """
+    ball = {
+        "name": "ball",
+        "root": "B",
+        "vessels": {"B": {"mass": 1.0, "pmi": [1.0, 2.0, 2.5]}},
+        "rotation": {"angular_velocity": [0.0, 0.0, 1.0]},
+        "experiment": {"duration": 3.0, "step": 1.0},
+    }
+    choice = Choice(BEST, "rk4", 0.05)
+    flown = fly_all(parse_scene(ball), [choice], lambda _: None)[choice]
+    assert flown.sub_steps == 3 * 21
+    assert flown.samples[-1, :4] == pytest.approx([np.cos(1.5), 0.0, 0.0, np.sin(1.5)], abs=1e-6)
+
+
+def test_every_model_of_a_scene_with_moving_parts_is_a_scene():
+    """Laws and propagators that know no moving parts are not tried."""
+    raw = variant(
+        ISS_DG,
+        {
+            "inputs": {"pose": ["DG.nose"], "motion": ["DG.nose"], "mass": ["DG"]},
+            "experiment": {
+                "duration": 2.0,
+                "step": 1.0,
+                "inputs": {"DG.nose.velocity[1]": [[0, 0], [1, 0.1]], "DG.mass": [[0, 24500], [2, 24000]]},
+            },
+        },
+    )
+    scene = parse_scene(raw)
+    tried = models(scene, quick=False)
+    assert Model("none") not in tried
+    assert {m.frozen for m in tried} == {"", "mass", "pose"}
+    for model in tried:
+        for choice in reference_choices(scene, model):
+            assert choice.propagator == "dop853"
+            variant_of(scene, choice)

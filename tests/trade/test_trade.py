@@ -1,0 +1,199 @@
+"""A small trade: references against 25 digits, errors apart, order, front, and what is kept."""
+
+import json
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from supervessel import parse_scene, reference
+from supervessel.trade import TradeError, plot, study, table
+from supervessel.trade.choices import BEST, Choice, label
+from supervessel.trade.experiment import course_of
+from supervessel.trade.flight import fly_all
+from support import variant
+from support.series import flight, mp, norm
+
+U = 2.0**-53
+
+BODY: dict[str, Any] = {
+    "name": "traded",
+    "root": "B",
+    "vessels": {"B": {"mass": 2.0, "inertia": [[1.0, 0.02, 0.0], [0.02, 2.0, 0.03], [0.0, 0.03, 2.9]]}},
+    "inputs": {"mass": ["B"], "torque": True},
+    "rotation": {"angular_velocity": [0.3, 0.7, 0.5]},
+    "experiment": {
+        "duration": 8.0,
+        "step": 0.5,
+        "inputs": {
+            "B.mass": [[2.0, 2.0], [6.0, 1.5]],
+            "torque[1]": [[0.0, 0.0], [4.0, 0.02], [4.0, -0.01]],
+        },
+    },
+    "outputs": {"names": ["pmi"]},
+}
+"""A body that loses mass while torque grows, then jumps; it turns by about 7 rad."""
+
+STEADY = variant(
+    BODY, {"inputs.mass": [], "experiment.inputs": {"torque[1]": BODY["experiment"]["inputs"]["torque[1]"]}}
+)
+
+
+@pytest.fixture(scope="module")
+def trade() -> dict[str, Any]:
+    """The quick trade of the body with steady mass."""
+    return study(parse_scene(STEADY), quick=True)
+
+
+def inertia_and_torque() -> list[tuple[np.ndarray, np.ndarray]]:
+    """The tensor and the torque of each step, straight from what BODY says."""
+    J = np.array(BODY["vessels"]["B"]["inertia"])
+    steps = []
+    for time in 0.5 * np.arange(16):
+        mass = np.interp(time, [2.0, 6.0], [2.0, 1.5])
+        torque = 0.005 * time if time < 4.0 else -0.01
+        steps.append((J * (mass / 2.0), np.array([torque, 0.0, 0.0])))
+    return steps
+
+
+@pytest.mark.parametrize("propagator", ["taylor", "dop853"])
+def test_references_are_right_to_rounding(propagator):
+    """Tensors and torques of 16 steps are each rounded, and so are the steps, of 0.5 rad: 16 (u + u)."""
+    scene = parse_scene(BODY)
+    choice = Choice(BEST, propagator, None, 1e-15)
+    flown = fly_all(scene, [choice], lambda _: None)[choice]
+    state = [mp.mpf(x) for x in (1.0, 0.0, 0.0, 0.0, 0.3, 0.7, 0.5)]
+    truth = []
+    for J, torque in inertia_and_torque():
+        state = flight("tensor", J, state, torque, 0.5)
+        truth.append(state)
+    assert course_of(scene).sampled.tolist() == list(range(1, 17))
+    off = [
+        float(norm([mp.mpf(float(a)) - b for a, b in zip(found, exact, strict=True)]))
+        for found, exact in zip(flown.samples, truth, strict=True)
+    ]
+    assert max(off) <= 32.0 * U
+
+
+def test_what_a_law_leaves_out_is_the_distance_of_the_two_motions(trade):
+    """Against another integration of other equations: reference.angular_acceleration, to 1e-11."""
+
+    def fly(law):
+        x, samples = np.array([1.0, 0.0, 0.0, 0.0, 0.3, 0.7, 0.5]), []
+        for _, torque in inertia_and_torque():
+
+            def ode(_: float, x: np.ndarray, torque: np.ndarray = torque) -> np.ndarray:
+                J = np.array(BODY["vessels"]["B"]["inertia"])
+                rate = reference.angular_acceleration(law, J, x[4:], torque)
+                return np.concatenate([reference.attitude_dot(x[:4], x[4:]), rate])
+
+            x = solve_ivp(ode, (0.0, 0.5), x, method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+            samples.append(x)
+        return np.array(samples)
+
+    tensor, principal = fly("tensor"), fly("principal")
+    turn = 2.0 * np.arccos(np.abs(np.sum(tensor[:, :4] * principal[:, :4], axis=1)))
+    apart = np.linalg.norm(tensor[:, 4:] - principal[:, 4:], axis=1)
+    own, best = trade["models"]
+    assert (own["law"], best["law"]) == ("principal", "tensor")
+    assert own["attitude"][-1] == pytest.approx(turn.max(), rel=1e-9)
+    assert own["rate"][-1] == pytest.approx(apart.max(), rel=1e-9)
+    assert best["attitude"] == best["rate"] == [0.0, 0.0, 0.0]
+    assert trade["doubt"]["attitude"][-1] <= 32.0 * U
+
+
+def test_integration_errors_are_apart_from_those_of_the_model(trade):
+    """Each row's whole error differs from its model's by no more than its own integration adds."""
+    left_out = {label(model): model["attitude"][-1] for model in trade["models"]}
+    for row in trade["choices"]:
+        assert abs(row["attitude"] - left_out[label(row)]) <= row["integration_attitude"] + 8.0 * U, row
+
+
+def test_the_integration_error_of_rk4_falls_with_the_fourth_power_of_its_steps(trade):
+    for law in ("principal", "tensor"):
+        rows = [r for r in trade["choices"] if (r["law"], r["propagator"]) == (law, "rk4")]
+        assert [r["settings"] for r in rows] == [["0.01"], ["0.05"], ["0.2"]]
+        for fine, coarse in pairwise(rows):
+            order = np.log(coarse["integration_attitude"] / fine["integration_attitude"]) / np.log(
+                fine["sub_steps"] / coarse["sub_steps"]
+            )
+            assert 3.7 < order < 4.3, (law, coarse, fine)
+
+
+def test_tolerances_are_kept_step_by_step(trade):
+    """16 steps may add their tolerance each; any may be missed tenfold."""
+    rows = [r for r in trade["choices"] if r["propagator"] in ("dop853", "taylor", "auto", "split")]
+    assert {r["propagator"] for r in rows} == {"dop853", "taylor", "auto", "split"}
+    for row in rows:
+        tightest = min(map(float, row["settings"]))
+        assert row["integration_attitude"] <= 160.0 * tightest + 32.0 * U, row
+
+
+def test_the_front_is_what_nothing_beats(trade):
+    doubt = trade["doubt"]["attitude"][-1]
+    points = [(max(r["attitude"], doubt), r["rk4_steps_per_step"]) for r in trade["choices"]]
+    for row, (error, cost) in zip(trade["choices"], points, strict=True):
+        beaten = any(e <= error and c <= cost and (e < error or c < cost) for e, c in points)
+        assert row["pareto"] is not beaten
+    assert {label(row) for row in trade["choices"] if row["pareto"]} >= {"tensor"}
+
+
+def test_costs_fit_together(trade):
+    for row in trade["choices"]:
+        assert row["us_per_second"] == pytest.approx(1e-3 * row["ns_per_step"] / 0.5)
+        assert row["sub_steps"] >= trade["steps"] == 16
+        assert row["bytes"] > 20_000
+        assert row["rk4_steps_per_step"] > 0.5 * row["sub_steps"] / 16 if row["propagator"] == "rk4" else True
+
+
+def test_the_same_again_is_what_was_kept(trade):
+    assert study(parse_scene(STEADY), quick=True) == trade  # timings and all
+    assert json.loads(json.dumps(trade)) == trade
+
+
+def test_another_start_is_flown_anew(trade, cache):
+    """The kept results are known by all of the scene."""
+    scene = parse_scene(variant(STEADY, {"rotation.angular_velocity": [0.3, 0.7, 0.4]}))
+    choice = Choice(BEST, "taylor", None, 1e-15)
+    before = set((cache / "trade").iterdir())
+    flown = fly_all(scene, [choice], lambda _: None)[choice]
+    assert len(set((cache / "trade").iterdir()) - before) == 1
+    assert flown.samples[0, 6] == pytest.approx(0.4, abs=0.1)
+
+
+def test_a_propagator_that_knows_no_torque_is_told_as_refused():
+    choice = Choice(BEST, "exact")
+    [flown] = fly_all(parse_scene(STEADY), [choice], lambda _: None).values()
+    assert flown.refused is not None
+    assert flown.refused.startswith("at 0.5 s: ")  # from where on the torque acts
+    assert "torque = (0.0025, 0, 0)" in flown.refused
+
+
+def test_an_experiment_that_the_scene_cannot_run_is_refused_with_the_fmus_words():
+    raw = {
+        "name": "grown",
+        "root": "B",
+        "vessels": {"B": {"mass": 1.0, "pmi": [1.0, 1.0, 1.0]}},
+        "inputs": {"pmi": ["B"]},
+        "experiment": {"duration": 4.0, "step": 1.0, "inputs": {"B.pmi[3]": [[0.0, 1.0], [4.0, 5.0]]}},
+    }
+    words = r"experiment: the scene cannot run it: at 2 s: .*B\.pmi = \(1, 1, 3\) m2: 3 exceeds 1 \+ 1 by 1"
+    with pytest.raises(TradeError, match=words):
+        study(parse_scene(raw), quick=True)
+
+
+def test_without_an_experiment_there_is_no_trade():
+    scene = parse_scene({key: value for key, value in STEADY.items() if key != "experiment"})
+    with pytest.raises(TradeError, match="experiment: missing; a trade needs"):
+        study(scene)
+
+
+def test_tables_and_plots_show_every_choice(trade):
+    text = table(trade)
+    assert text.count("| tensor |") == 1 + sum(row["law"] == "tensor" for row in trade["choices"])
+    drawn = plot(trade)
+    assert drawn["png"].startswith(b"\x89PNG")
+    assert drawn["svg"].decode().count("<use ") >= len(trade["choices"])
+    assert plot(trade) == drawn
