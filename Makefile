@@ -28,6 +28,7 @@ stability: .venv/installed-dev
 
 bench: .venv/installed-dev
 	$(BIN)/python tests/bench/run.py
+	PYTHONPATH=tests $(BIN)/python tests/bench/costs.py
 	$(BIN)/python tests/bench/propagators.py
 	$(BIN)/python tests/bench/twin.py
 	mkdir -p build

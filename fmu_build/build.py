@@ -10,6 +10,7 @@ from fmu_build.codegen import digest, model_source, scene_header, scene_source
 from fmu_build.compiler import compile_binaries, compiler_cache
 from fmu_build.documentation import documentation
 from fmu_build.errors import BuildError
+from fmu_build.loop import loop_functions, loop_source, loop_tables
 from fmu_build.model_description import model_description
 from fmu_build.platforms import Platform, host_platform
 from fmu_build.reference_result import reference_result
@@ -53,15 +54,18 @@ def generate(scene: Scene, fmi: int) -> tuple[dict[str, str], bytes]:
     model = equations(scene)
     entries = variable_table(scene, model)
     changing = model.change is not None
+    loop = loop_tables(scene, model)
+    functions = model.functions if loop is None else loop_functions(scene, model)
+    tables = change_tables(scene, model) + loop_source(loop)
     sources = {
-        "model.c": model_source(model),
-        "scene.h": scene_header(scene, model, entries),
-        "scene.c": scene_source(entries, "", changing) + change_tables(scene, model),
+        "model.c": model_source(functions),
+        "scene.h": scene_header(scene, model, entries, functions, loop),
+        "scene.c": scene_source(entries, "", changing) + tables,
     }
     names = source_file_names(sources, fmi)
     without_token = model_description(scene, entries, "", fmi, names)
     token = digest(*source_files(sources, fmi, scene.name).values(), without_token)
-    sources["scene.c"] = scene_source(entries, token, changing) + change_tables(scene, model)
+    sources["scene.c"] = scene_source(entries, token, changing) + tables
     return sources, model_description(scene, entries, token, fmi, names)
 
 

@@ -4,13 +4,14 @@ import hashlib
 import re
 import tempfile
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import casadi as ca
 
 from fmu_build.changes import change_constants
 from fmu_build.errors import BuildError
+from fmu_build.loop import Tables, loop_constants
 from fmu_build.table import Entry
 from supervessel.equations import Equations
 from supervessel.propagators.free_motion import FIRST_ANGLE, LARGEST_TURN
@@ -30,10 +31,10 @@ CHOICES = {
 """What the C layer compiles for a plan (`supervessel.propagators`), as the preprocessor sees it."""
 
 
-def model_source(model: Equations) -> str:
+def model_source(functions: Iterable[ca.Function]) -> str:
     """Returns model.c: the scene's equations as C functions without external symbols of their own."""
     generator = ca.CodeGenerator("model.c", {"with_export": False, "casadi_int": "int", "verbose": False})
-    for function in model.functions:
+    for function in functions:
         generator.add(function)
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -54,12 +55,22 @@ def _without_null_checks(source: str) -> str:
     return re.sub(r"if \(res\[(\d+)\]!=0\) res\[\1\]", r"res[\1]", source)
 
 
-def scene_header(scene: Scene, model: Equations, entries: Sequence[Entry]) -> str:
-    """Returns scene.h: counts, places and limits of the scene."""
+def scene_header(
+    scene: Scene,
+    model: Equations,
+    entries: Sequence[Entry],
+    functions: Iterable[ca.Function],
+    loop: Tables | None,
+) -> str:
+    """Returns scene.h: counts, places and limits of the scene.
+
+    functions : those of model.c
+    loop      : tables of the composite's loop
+    """
     where = model.slices
     references = {entry.variable.name: entry.reference for entry in entries}
     p_count, k_count, u_count = len(model.p_names), len(model.k_names), len(model.u_names)
-    sizes = [(f.sz_arg(), f.sz_res(), f.sz_iw(), f.sz_w()) for f in model.functions]
+    sizes = [(f.sz_arg(), f.sz_res(), f.sz_iw(), f.sz_w()) for f in functions]
     arg, res, iw, w = (max(1, *column) for column in zip(*sizes, strict=True))
     begun = [f for f in model.functions if f.name() == "free_start"]
     constants = {
@@ -92,13 +103,14 @@ def scene_header(scene: Scene, model: Equations, entries: Sequence[Entry]) -> st
         "WORK_ARG": arg,
         "WORK_RES": res,
         "WORK_INT": iw,
-        "WORK_REAL": w,
+        "WORK_REAL": w + (loop.work if loop else 0),
     }
     plan = model.plan
     macros = {
         "DOCKED_COUNT": len(scene.inputs.docked),
         "AXES_COUNT": model.axes.numel_out(0),
         **change_constants(scene, model),
+        **loop_constants(loop),
         "STEPS": f"STEPS_BY_{plan.method.control.upper()}" if plan.method else "STEPS_NONE",
         "FREE": f"FREE_{plan.free.upper().replace(' ', '_')}",
         "ERROR_EXPONENT": model.error_exponent,

@@ -163,7 +163,7 @@ static void begin_from_now(Dynamics *now) {
 #if STATE_IS_MOMENTUM
 
 static bool states_lead(const Instance *instance) {
-    return instance->now.model_exchange && !(instance->now.state & BEFORE_START);
+    return instance->now.model_exchange && !(changes_state(instance) & BEFORE_START);
 }
 
 static void momentum_from_rate(Instance *instance, const double rate[3], double momentum[3]) {
@@ -221,12 +221,12 @@ static Status check_continuous(Instance *instance, const double p[]) {
 Status changes_apply(Instance *instance, const double p[], const double c[]) {
     Dynamics *now = &instance->now;
     double rate[3];
-    if (now->state & BEFORE_START) {
+    if (changes_state(instance) & BEFORE_START) {
         become_current(instance, p, c);
         instance_state_moved(instance);
         return STATUS_OK;
     }
-    if (now->state == CONTINUOUS) {
+    if (changes_state(instance) == CONTINUOUS) {
 #if !STATE_IS_MOMENTUM
         const Status status = check_continuous(instance, p);
         if (status != STATUS_OK) return status;

@@ -26,6 +26,13 @@ extern const Dock DOCKS[DOCK_COUNT];
 Status changes_check_docks(Instance *instance, const double p[]);
 #endif
 
+#if CHANGES
+/* The State whose rules hold for what is read: after the end those that held before. */
+static inline unsigned changes_state(const Instance *instance) {
+    return instance->now.state == TERMINATED ? instance->now.ended_in : instance->now.state;
+}
+#endif
+
 /* Makes the rate follow from a change to p, whose composite is c; they become current if it can. */
 Status changes_apply(Instance *instance, const double p[], const double c[]);
 

@@ -83,7 +83,7 @@ static double *place(Variation *v, unsigned reference) {
 
 /* Whether the angular velocity follows from inputs: in co-simulation, but not within a step. */
 static bool rate_follows(const Instance *instance) {
-    return !instance->now.model_exchange && !(instance->now.state & (BEFORE_START | INTERMEDIATE));
+    return !instance->now.model_exchange && !(changes_state(instance) & (BEFORE_START | INTERMEDIATE));
 }
 
 #endif

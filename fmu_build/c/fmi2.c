@@ -117,7 +117,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component instance) {
 
 fmi2Status fmi2Terminate(fmi2Component instance) {
     if (!instance || !instance_admits(instance, &TERMINATE)) return fmi2Error;
-    ((Instance *)instance)->now.state = TERMINATED;
+    instance_terminate(instance);
     return fmi2OK;
 }
 

@@ -178,7 +178,7 @@ fmi3Status fmi3ExitInitializationMode(fmi3Instance instance) {
 
 fmi3Status fmi3Terminate(fmi3Instance instance) {
     if (!instance || !instance_admits(instance, &TERMINATE)) return fmi3Error;
-    ((Instance *)instance)->now.state = TERMINATED;
+    instance_terminate(instance);
     return fmi3OK;
 }
 

@@ -68,7 +68,7 @@ Status instance_error(Instance *instance, const char *format, ...) {
     va_start(arguments, format);
     write_message(instance, STATUS_ERROR, LOG_ERROR, format, arguments);
     va_end(arguments);
-    instance->now.state = TERMINATED;
+    instance_terminate(instance);
     return STATUS_ERROR;
 }
 
@@ -78,7 +78,7 @@ Status instance_refuse(Instance *instance, const char *format, ...) {
     va_start(arguments, format);
     write_message(instance, status, status == STATUS_ERROR ? LOG_ERROR : LOG_DISCARD, format, arguments);
     va_end(arguments);
-    if (status == STATUS_ERROR) instance->now.state = TERMINATED;
+    if (status == STATUS_ERROR) instance_terminate(instance);
     return status;
 }
 
@@ -179,5 +179,8 @@ Status instance_exit_initialization(Instance *instance) {
     memcpy(instance->now.stepped_p, instance->now.p, sizeof instance->now.p);
 #endif
     instance->now.state = instance->now.model_exchange ? EVENT : STEPPING;
+#if STATE_IS_MOMENTUM
+    instance_state_moved(instance); /* where the states lead now, the rate follows from them as it will ever after */
+#endif
     return STATUS_OK;
 }

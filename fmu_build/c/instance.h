@@ -56,7 +56,7 @@ typedef void (*LogWriter)(const Instance *instance, Status status, const char *c
    early, at *end [s] or as soon as possible after it. */
 typedef bool (*SubStepListener)(Instance *instance, double *end);
 
-/* All that a saved state holds. The doubles come first: there is no padding. */
+/* All that a saved state holds. The doubles come first: there is no padding but at the end, and that stays zero. */
 typedef struct {
     double values[VARIABLE_COUNT];    /* by value reference: time, inputs, parameters, outputs, states, rates */
     double start_time;                /* s */
@@ -79,6 +79,9 @@ typedef struct {
     double elapsed, elapsed_rest;     /* s since then, as an unevaluated sum */
     unsigned state;                   /* a State */
     unsigned model_exchange;          /* else co-simulation */
+#if CHANGES
+    unsigned ended_in;                /* the State before TERMINATED */
+#endif
     unsigned stop_time_defined;
     unsigned composite_is_current;    /* p and c follow from the inputs as they are */
     unsigned axes_are_current;        /* a follows from c */
@@ -158,6 +161,14 @@ static inline double *instance_x(Instance *instance) {
 #else
     return instance_states(instance);
 #endif
+}
+
+/* Ends the instance. */
+static inline void instance_terminate(Instance *instance) {
+#if CHANGES
+    if (instance->now.state != TERMINATED) instance->now.ended_in = instance->now.state;
+#endif
+    instance->now.state = TERMINATED;
 }
 
 /* What follows from attitude, angular velocity or states has to be computed anew. */

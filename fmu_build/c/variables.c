@@ -84,6 +84,18 @@ static Status beyond_range(Instance *instance, size_t reference) {
     return instance_refuse(instance, "%s leaves the range of finite numbers", VARIABLES[reference].name);
 }
 
+/* What must be current before a variable is read. In continuous time inputs leave the states as they are. */
+static unsigned follows(const Instance *instance, unsigned reference) {
+    const unsigned all = VARIABLES[reference].follows;
+#if CHANGES
+    const bool is_state = VARIABLES[reference].role == ROLE_STATE;
+    if (is_state && changes_state(instance) == CONTINUOUS) return all & ~(unsigned)FOLLOWS_COMPOSITE;
+#else
+    (void)instance;
+#endif
+    return all;
+}
+
 Status instance_get(Instance *instance, const unsigned references[], size_t count, double values[]) {
     if (count == 0) return STATUS_OK;
     if (!references || !values) return instance_error(instance, "an array is NULL");
@@ -91,7 +103,7 @@ Status instance_get(Instance *instance, const unsigned references[], size_t coun
     for (size_t i = 0; i < count; i++) {
         if (references[i] >= VARIABLE_COUNT) return unknown_reference(instance, references[i]);
         if (is_boolean(references[i])) return refuse_boolean(instance, references[i]);
-        wanted |= VARIABLES[references[i]].follows;
+        wanted |= follows(instance, references[i]);
     }
     const Status status = prepare(instance, wanted);
     if (status != STATUS_OK) return status;
@@ -247,8 +259,8 @@ static Status check_states(Instance *instance, const void *array, size_t count) 
 
 Status instance_get_states(Instance *instance, double states[], size_t count) {
     Status status = check_states(instance, states, count);
-    const unsigned follows = FOLLOWS_STATES | (CHANGES ? FOLLOWS_COMPOSITE : 0);
-    if (status == STATUS_OK) status = prepare(instance, follows | FOLLOWS_ATTITUDE);
+    const unsigned wanted = CHANGES ? follows(instance, REFERENCE_STATES + 4) : FOLLOWS_STATES;
+    if (status == STATUS_OK) status = prepare(instance, wanted | FOLLOWS_ATTITUDE);
     if (status == STATUS_OK) memcpy(states, instance_states(instance), STATE_COUNT * sizeof(double));
     return status;
 }

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from supervessel.assembly import Joint, Way, groups, ways
 from supervessel.inertia import Body, combine, orbiter_moments, placed_body, symmetric
-from supervessel.lumps import Places, lump, places
+from supervessel.lumps import Places, constant_and_varying, lump, places
 from supervessel.poses import Pose, constant, mated_pose, port_axes, scaled
 from supervessel.scene import Scene
 
@@ -52,7 +52,11 @@ def composite_body(scene: Scene, lookup: Lookup) -> Body:
         if group.attached is not None:
             lumped = [body.times(group.attached) for body in lumped]
         bodies += lumped
-    whole = combine(bodies)
+    return by_convention(scene, combine(bodies))
+
+
+def by_convention(scene: Scene, whole: Body) -> Body:
+    """Returns the whole as the scene's convention has it: Orbiter's is without products of inertia."""
     if scene.convention == "orbiter":
         diagonal = symmetric(lambda i, j: whole.inertia[i, i] if i == j else ca.SX(0.0))
         return Body(whole.mass, whole.centre, diagonal, whole.velocity, whole.spin)
@@ -130,19 +134,12 @@ def _chosen(flags: Sequence[ca.SX], poses: Sequence[Pose]) -> tuple[ca.SX, Pose]
 
 
 def _lumped(scene: Scene, inside: Places, lookup: Lookup) -> list[Body]:
-    """Returns the vessels of a group in its axes: those that are constant as one body, before the others.
-
-    The heaviest stand first, those whose mass is an input last; those without mass are left out.
-    """
-    of_mass, of_moments = set(scene.inputs.mass), set(scene.inputs.pmi)
-    known = [name for name in inside if name not in of_mass and scene.vessels[name].mass > 0.0]
-    known.sort(key=lambda name: -scene.vessels[name].mass)
-    fixed = {name: inside[name] for name in known if name not in of_moments}
-    varying = [name for name in known if name in of_moments] + [name for name in inside if name in of_mass]
+    """Returns the vessels of a group in its axes: those that are constant as one body, before the others."""
+    constants, varying = constant_and_varying(scene, inside)
     bodies = [vessel_body(scene, name, lookup, inside[name]) for name in varying]
-    if not fixed:
+    if not constants:
         return bodies
-    mass, centre, inertia = lump(scene, fixed)
+    mass, centre, inertia = lump(scene, {name: inside[name] for name in constants})
     return [Body(constant(mass), constant(centre), constant(inertia)), *bodies]
 
 

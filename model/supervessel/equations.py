@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from supervessel.attitude import attitude_dot, rotation_matrix, to_inertial, unit
 from supervessel.changes import Change, change_functions, lookup_in
 from supervessel.docking import composite_body
-from supervessel.inertia import from_upper_triangle, ldl, ldl_inverse, upper_triangle
+from supervessel.inertia import Body, from_upper_triangle, ldl, ldl_inverse, upper_triangle
 from supervessel.principal import principal, principal_forward, quaternion
 from supervessel.propagators import PROPAGATORS, Plan, plan_of
 from supervessel.propagators.bound import fastest_square
@@ -242,8 +242,8 @@ def equations(scene: Scene) -> Equations:
         step=steps[1],
         propagation=tuple(propagation),
         product_count=products.size2(),
-        **_derivatives("composite", [p], [c_of_p]),
-        **_derivatives("response", state_args, [z_rate, y], (a, *_axes_change(inertia, c, a, slices))),
+        **derivatives("composite", [p], [c_of_p]),
+        **derivatives("response", state_args, [z_rate, y], (a, *_axes_change(inertia, c, a, slices))),
         change=change,
         changing=_changing(scene, change, by_momentum),
         plan=plan,
@@ -342,9 +342,16 @@ def composite_parts(scene: Scene, p: ca.SX) -> dict[str, ca.SX]:
     moment, force : see `vessels.action_parts`
     .NAME         : see `vessels.vessel_parts`
     """
-    law = LAWS[scene.rotation.law]
     lookup = lookup_in(scene, p, ("shape",))
     body = composite_body(scene, lookup)
+    parts = body_parts(scene, body)
+    parts |= action_parts(scene, lookup, body.centre) | vessel_parts(scene, lookup, body)
+    return {name: ca.densify(part) for name, part in parts.items()}
+
+
+def body_parts(scene: Scene, body: Body) -> dict[str, ca.SX]:
+    """Returns those parts of c by name that follow from the whole as one body in the root's axes."""
+    law = LAWS[scene.rotation.law]
     J = body.inertia
     lower, pivots = ldl(J)
     margins = ca.vertcat(
@@ -363,7 +370,6 @@ def composite_parts(scene: Scene, p: ca.SX) -> dict[str, ca.SX]:
     if body.spin is not None:
         bound = ca.trace(ldl_inverse(lower, pivots))
         parts["momentum"] = ca.vertcat(body.spin, ca.sumsqr(body.spin) * bound * bound)
-    parts |= action_parts(scene, lookup, body.centre) | vessel_parts(scene, lookup, body)
     return {name: ca.densify(part) for name, part in parts.items()}
 
 
@@ -375,11 +381,11 @@ def _changing(scene: Scene, change: Change | None, by_momentum: bool) -> tuple[c
     functions += [change.keep_momentum] if "momentum" in scene.keeps.values() else []
     for function in functions[:1]:
         arguments = [ca.SX.sym(f"v{i}", function.numel_in(i)) for i in range(function.n_in())]
-        functions += _derivatives(function.name(), arguments, [function(*arguments)]).values()
+        functions += derivatives(function.name(), arguments, [function(*arguments)]).values()
     return (*functions, *((change.contact_momentum, change.docked_rate) if scene.inputs.docked else ()))
 
 
-def _derivatives(
+def derivatives(
     name: str, arguments: list[ca.SX], results: list[ca.SX], axes: tuple[ca.SX, ca.SX, ca.SX] | None = None
 ) -> dict[str, ca.Function]:
     """Returns the functions NAME_forward and NAME_reverse.

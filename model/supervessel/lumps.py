@@ -33,13 +33,39 @@ def places(scene: Scene, parts: Sequence[Group]) -> list[Places]:
     return found
 
 
+def constant_and_varying(scene: Scene, inside: Places) -> tuple[list[str], list[str]]:
+    """Returns the vessels of a group that are constant, and the others, in the order of adding them up.
+
+    The heaviest stand first, those whose mass is an input last; those without mass are left out.
+    """
+    of_mass, of_moments = set(scene.inputs.mass), set(scene.inputs.pmi)
+    known = [name for name in inside if name not in of_mass and scene.vessels[name].mass > 0.0]
+    known.sort(key=lambda name: -scene.vessels[name].mass)
+    varying = [name for name in known if name in of_moments] + [name for name in inside if name in of_mass]
+    return [name for name in known if name not in of_moments], varying
+
+
 def lump(scene: Scene, placed: Places) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
     """Returns vessels of constant mass as one body: mass [kg], centre (3,) [m], inertia (3, 3) [kg m2].
 
     placed : the vessels, in the order in which they are added up; at least one
     """
+    masses = np.array([scene.vessels[name].mass for name in placed])
+    centres, tensors = _seen(scene, placed, masses)
+    return combine_numbers(masses, centres, tensors)
+
+
+def seen_in_group(scene: Scene, placed: Places) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Returns centres, (n, 3) [m], and tensors over mass, (n, 3, 3) [m2], of vessels in the group's axes."""
+    centres, tensors = _seen(scene, placed, np.ones(len(placed)))
+    return centres.T, tensors.transpose(2, 0, 1)
+
+
+def _seen(
+    scene: Scene, placed: Places, masses: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Returns centres, (3, n) [m], and inertia tensors, (3, 3, n) [kg m2], in the group's axes."""
     vessels = [scene.vessels[name] for name in placed]
-    masses = np.array([vessel.mass for vessel in vessels])
     centres, inertias = _placed_bodies()(
         masses[None, :],
         np.hstack([_specific_inertia(scene, vessel) for vessel in vessels]),
@@ -47,8 +73,7 @@ def lump(scene: Scene, placed: Places) -> tuple[float, NDArray[np.float64], NDAr
         ca.evalf(ca.horzcat(*(pose.rotation for pose in placed.values()))),
         ca.evalf(ca.horzcat(*(pose.origin for pose in placed.values()))),
     )
-    tensors = np.array(inertias).reshape(3, len(vessels), 3).transpose(0, 2, 1)
-    return combine_numbers(masses, np.array(centres), tensors)
+    return np.array(centres), np.array(inertias).reshape(3, len(vessels), 3).transpose(0, 2, 1)
 
 
 def _specific_inertia(scene: Scene, vessel: Vessel) -> NDArray[np.float64]:

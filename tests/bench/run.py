@@ -11,6 +11,7 @@ import tempfile
 from pathlib import Path
 
 from fmpy import extract, read_model_description
+from fmpy.model_description import ModelDescription
 
 from fmu_build import build_fmu
 from fmu_build.compiler import FLAGS, fmi_headers
@@ -47,37 +48,47 @@ def by_rk4(scene: Scene) -> Scene:
     return scene.model_copy(update={"rotation": scene.rotation.model_copy(update={"propagator": "rk4"})})
 
 
+def unpack(scene: Scene, folder: Path) -> tuple[Path, ModelDescription]:
+    """Returns the library for this machine of a scene's FMU, built in a folder, and its model description."""
+    fmu = build_fmu(scene, folder / f"{scene.name}.fmu")
+    unpacked = Path(extract(str(fmu), str(folder / scene.name)))
+    library = unpacked / "binaries" / host_platform().name / f"{scene.name}{host_platform().suffix}"
+    return library, read_model_description(str(fmu))
+
+
+def times(
+    host: Path, library: Path, description: ModelDescription, inputs: list[str], outputs: list[str]
+) -> dict[str, tuple[str, str]]:
+    """Returns nanoseconds and plain RK4 steps, as printed, of each case of MEANINGS and of a plain step."""
+    references = {v.name: v.valueReference for v in description.modelVariables}
+    numbers = [str(n) for names in (inputs, outputs) for n in (len(names), *(references[x] for x in names))]
+    command = [str(host), str(library), description.guid, str(STEPS), *numbers]
+    lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
+    return {case: (nanoseconds, ratio) for case, nanoseconds, ratio in map(str.split, lines)}
+
+
+def names_of(description: ModelDescription, causality: str) -> list[str]:
+    """Returns the names of the variables of a causality."""
+    return [v.name for v in description.modelVariables if v.causality == causality]
+
+
 def main() -> None:
     """Prints the table, for the torque alone and for every input and output."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        fmu = build_fmu(by_rk4(load_scene(SCENE)), folder / "iss_dg.fmu")
-        unpacked, description = (
-            Path(extract(str(fmu), str(folder / "unpacked"))),
-            read_model_description(str(fmu)),
-        )
-        library = unpacked / "binaries" / host_platform().name / f"iss_dg{host_platform().suffix}"
+        library, description = unpack(by_rk4(load_scene(SCENE)), folder)
         host = build_host("host", folder)
-        references = {v.name: v.valueReference for v in description.modelVariables}
-        by_causality = {
-            causality: [v.name for v in description.modelVariables if v.causality == causality]
-            for causality in ("input", "output")
-        }
-        flown = [n for n in by_causality["output"] if n.startswith(("attitude", "angular_velocity"))]
-        torque = [n for n in by_causality["input"] if n.startswith("torque")]
+        inputs, outputs = (names_of(description, causality) for causality in ("input", "output"))
+        flown = [n for n in outputs if n.startswith(("attitude", "angular_velocity"))]
+        torque = [n for n in inputs if n.startswith("torque")]
         print(
             f"{platform.system()} {platform.machine()}, ISS with a DeltaGlider, one sub-step of 1 ms a step\n"
         )
         print("| inputs set, outputs got | | ns | plain RK4 steps |\n|---|---|---:|---:|")
-        for inputs, outputs in ((torque, flown), (by_causality["input"], by_causality["output"])):
-            numbers = [str(len(inputs)), *(str(references[n]) for n in inputs)]
-            numbers += [str(len(outputs)), *(str(references[n]) for n in outputs)]
-            command = [str(host), str(library), description.guid, str(STEPS), *numbers]
-            lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
-            for line in lines:
-                case, nanoseconds, ratio = line.split()
+        for some, got in ((torque, flown), (inputs, outputs)):
+            for case, (nanoseconds, ratio) in times(host, library, description, some, got).items():
                 what = MEANINGS.get(case, "a plain RK4 step")
-                print(f"| {len(inputs)}, {len(outputs)} | {what} | {nanoseconds} | {ratio} |")
+                print(f"| {len(some)}, {len(got)} | {what} | {nanoseconds} | {ratio} |")
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from changes.histories import (
     ByExchange,
     ByFmu,
     assembly,
+    elements,
     happening,
     legal,
     start_values,
@@ -17,7 +18,8 @@ from changes.histories import (
 from changes.test_bad_input import brought
 from changes.test_exchange import DURATION, MIXED, STEADY, TUG, drawn_in
 from fmu.test_intermediate_update import Listener
-from support import EPS, OK, Instance, scene, variant
+from fmu.test_saved_state import bytes_of, restore
+from support import DISCARD, EPS, OK, Instance, scene, variant
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
 SCENES = pytest.mark.parametrize("raw", [TUG, MIXED, STEADY], ids=["momentum", "mixed", "rate"])
@@ -126,6 +128,38 @@ def test_states_that_are_read_first_follow_from_what_was_set(raw, place):
         instance.free()
     assert found[0].any()
     assert found[0].tolist() == found[1].tolist()
+
+
+@FMI
+@SCENES
+def test_what_is_read_after_the_end_is_what_was_there(raw, fmi):
+    driver = ByExchange(raw, fmi)
+    instance = driver.instance
+    driver.rates(1.0, 2.0 * driver.states)
+    assert instance.set({"tank.mass": 123.0}) == OK
+    states = driver.states.tolist()
+    assert instance._status(instance.fmu.terminate) == OK
+    assert driver.states.tolist() == states
+    instance.free()
+
+
+def test_what_was_refused_before_the_end_is_refused_after_it():
+    driver = ByExchange(MIXED)
+    instance = driver.instance
+    assert instance.set(elements("tug.arm.position", (2.5, 0.5, 0.0))) == OK
+    assert instance.get_status("mass") == DISCARD
+    assert instance._status(instance.fmu.terminate) == OK
+    assert instance.get_status("mass") == DISCARD
+    instance.free()
+
+
+def test_a_state_that_is_restored_at_the_start_gives_the_same_rate_to_the_last_bit():
+    driver = ByExchange(variant(TUG, {"rotation.angular_velocity": [0.1, 0.3, 0.7]}))
+    content = bytes_of(driver.instance)
+    rate = driver.angular_velocity.tolist()
+    assert restore(driver.instance, content) == OK
+    assert driver.angular_velocity.tolist() == rate
+    driver.instance.free()
 
 
 # Sets and reads on the way.

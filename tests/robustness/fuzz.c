@@ -479,10 +479,12 @@ static Answer set(Slot *slot) {
     const size_t count = 1 + below(4), value_count = FMI == 3 && once_in(60) ? count - 1 : count;
     unsigned *references = array(count, sizeof *references);
     double *values = array(count, sizeof *values), back = 0.0;
-    bool right = value_count == count, finite = true;
+    bool right = value_count == count, finite = true, judged = false;
     for (size_t i = 0; i < count; i++) {
         references[i] = reference_to_set(slot);
         values[i] = value_for(references[i]);
+        /* states go with the inputs set before them */
+        judged = judged || (CHANGES && slot->now.state == EVENT && references[i] >= REFERENCE_STATES);
         right = right && settable(slot, references[i]);
         finite = finite && isfinite(values[i]);
     }
@@ -490,7 +492,7 @@ static Answer set(Slot *slot) {
     const bool given = value_count == count && !no_references && !no_values;
     Answer answer = {OK, ANYTHING};
     if (!(slot->now.state & (BEFORE_START | RUNNING)) || !given || (!right && finite)) answer.expected = AN_ERROR;
-    else if (right) answer.expected = finite ? FINE : A_DISCARD;
+    else if (right) answer.expected = !finite ? A_DISCARD : judged ? NO_ERROR : FINE;
     answer.status = set_values(slot, no_references ? NULL : references, count, no_values ? NULL : values, value_count);
     if (answer.status == OK && (FMI == 3 || slot->now.state != INSTANTIATED) &&
         VARIABLES[references[count - 1]].role != ROLE_STATE) {
@@ -752,7 +754,7 @@ static Answer update_discrete_states(Slot *slot) {
     Answer answer = {OK, expect(slot, EVENT, !null)};
     answer.status = (int)fmi3UpdateDiscreteStates(slot->component, &flags[0], &flags[1], null ? NULL : &flags[2],
                                                   &flags[3], &flags[4], &time);
-    if (answer.status == OK && (flags[0] || flags[1] || flags[2] || flags[3] || flags[4]))
+    if (answer.status == OK && (flags[0] || flags[1] || flags[2] || (flags[3] && !CHANGES) || flags[4]))
         fail("an update asks for an event", slot, OK);
 #else
     fmi2EventInfo info;
@@ -776,7 +778,7 @@ static Answer change_mode(Slot *slot) {
         return answer;
     }
     called = EITHER("fmi2EnterContinuousTimeMode", "fmi3EnterContinuousTimeMode");
-    answer.expected = slot->now.state == EVENT ? FINE : AN_ERROR;
+    answer.expected = slot->now.state != EVENT ? AN_ERROR : !CHANGES ? FINE : EITHER(ANYTHING, NO_ERROR);
     answer.status = (int)EITHER(fmi2EnterContinuousTimeMode, fmi3EnterContinuousTimeMode)(slot->component);
     if (answer.status == OK) slot->now.state = CONTINUOUS;
     return answer;
@@ -988,7 +990,8 @@ static bool comparable(const Slot *slot, unsigned state, int status, unsigned re
     if (role == ROLE_TIME || role == ROLE_INPUT || role == ROLE_PARAMETER) return true;
     const bool reading_may_end_it = FMI == 2 && !slot->exchange;
     if (state & BEFORE_START) return status == DISCARD && !reading_may_end_it;
-    if (role == ROLE_STATE || !reading_may_end_it) return true;
+    if (!reading_may_end_it) return true;
+    if (role == ROLE_STATE) return !CHANGES || reference < REFERENCE_STATES + 4;
     return reference >= attitude_reference && reference < attitude_reference + 4;
 }
 

@@ -25,9 +25,10 @@ pytestmark = pytest.mark.robustness
 CALLS = 1_200_000
 TIME_LIMIT = 600.0  # s; the runs take about ten seconds each
 SUITE_TIME_LIMIT = 3600.0  # s; about ten minutes on two cores
-BUILDS = pytest.mark.parametrize(
-    ("fmi", "propagator"), [(2, "rk4"), (3, "rk4"), (2, "auto"), (3, "auto"), (3, "split")]
-)
+PROPAGATORS = [(2, "rk4"), (3, "rk4"), (2, "auto"), (3, "auto"), (3, "split")]
+SCENES = [(2, "moving"), (3, "moving"), (2, "mixed"), (3, "mixed")]
+BUILDS = pytest.mark.parametrize(("fmi", "propagator"), [*PROPAGATORS, *SCENES])
+"""FMI version, and propagator of RAW or one of CHANGING."""
 SANITIZED = (
     "-O1",
     "-g",
@@ -90,6 +91,27 @@ RAW: dict[str, Any] = {
 }
 """A scene with inputs of each kind, light enough that extreme values meet ordinary ones."""
 
+MOVING = variant(
+    RAW,
+    {
+        "vessels.B.points": {"rcs": {"position": [0.5, -1.0, 0.25]}},
+        "inputs.motion": ["B.aft"],
+        "inputs.force": ["B.rcs"],
+        "inputs.vessel_torque": ["C"],
+        "rotation.mass_change": "momentum",
+        "rotation.pose_change": "momentum",
+        "outputs.names": [
+            *RAW["outputs"]["names"],
+            "net_force",
+            "C.origin",
+            "C.attitude",
+            "C.angular_momentum",
+        ],
+    },
+)
+CHANGING = {"moving": MOVING, "mixed": variant(MOVING, {"rotation.mass_change": "rate"})}
+"""Scenes with forces and a port that moves, in which all changes keep momentum, or poses alone do."""
+
 
 @cache
 def compiler() -> str:
@@ -109,7 +131,8 @@ def compiler() -> str:
 def fuzzer(fmi: int, propagator: str, flags: tuple[str, ...]) -> Path:
     """Returns the fuzzer linked with the sources that lie in an FMU."""
     folder = Path(tempfile.mkdtemp(prefix="supervessel-fuzz-"))
-    with zipfile.ZipFile(built(variant(RAW, {"rotation.propagator": propagator}), fmi)) as archive:
+    raw = CHANGING.get(propagator) or variant(RAW, {"rotation.propagator": propagator})
+    with zipfile.ZipFile(built(raw, fmi)) as archive:
         archive.extractall(folder)
     sources = folder / "sources"
     common = [compiler(), "-std=c99", "-ffp-contract=off", *flags, f"-DFMI={fmi}"]
@@ -194,7 +217,7 @@ def test_the_fmu_test_suite_runs_clean_on_libraries_with_sanitizers(tmp_path):
         "UBSAN_OPTIONS": f"print_stacktrace=1:log_path={tmp_path / 'undefined'}",
     }
     command = [sys.executable, "-m", "pytest", "-q", "-n", "auto", "-p", "sanitized"]
-    command += ["-k", "not leave_no_memory_behind", str(here.parent / "fmu")]
+    command += ["-k", "not leave_no_memory_behind", str(here.parent / "fmu"), str(here.parent / "changes")]
     done = subprocess.run(
         command, env=environment, capture_output=True, text=True, timeout=SUITE_TIME_LIMIT, check=False
     )

@@ -1,15 +1,20 @@
 """What a scene costs: the scenes of the README's table, and what is counted of them."""
 
+import tomllib
 from pathlib import Path
 from typing import Any
 
 import casadi as ca
 
-from supervessel import Scene, load_scene, parse_scene
-from supervessel.equations import Equations
+from fmu_build.build import compile_sources, generate
+from fmu_build.platforms import PLATFORMS
+from fmu_build.sources import source_file_names, source_files
+from supervessel import Scene, parse_scene
+from supervessel.equations import equations
 from support import ISS_DG, body, variant
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
+(PLATFORM,) = (platform for platform in PLATFORMS if platform.name == "x86_64-linux")
 NO_ARITHMETIC = (ca.OP_CONST, ca.OP_INPUT, ca.OP_OUTPUT)
 
 
@@ -36,32 +41,19 @@ def _module(number: int) -> dict[str, Any]:
 
 
 def table_scenes() -> dict[str, Scene]:
-    """Returns the scenes of the table by the names of its rows; `rk4` carries each over its steps."""
-    by_rk4 = {"rotation.propagator": "rk4"}
+    """Returns the scenes of the table by the names of its rows, carried over a step by `rk4`."""
     ship = {"outputs": None, "inputs": {"mass": ["DG"], "torque": True}}
-    everything = {
-        "inputs.mass": ["ISS", "DG"],
-        "inputs.pmi": ["ISS", "DG"],
-        "inputs.pose": ["ISS.P2", "DG.nose"],
-    }
+    both = {"mass": ["ISS", "DG"], "pmi": ["ISS", "DG"], "pose": ["ISS.P2", "DG.nose"], "torque": True}
+    stack = tomllib.loads((EXAMPLES / "launch_stack.toml").read_text(encoding="utf-8"))
     raw = {
         "a single body": variant(body(), {"outputs": None}),
-        "ISS with a ship, its mass an input": variant(ISS_DG, ship),
-        "ISS with a ship, all masses, moments and poses inputs": variant(
-            ISS_DG, {"outputs": None, **everything}
-        ),
-        "a launch stack of seven parts, four masses inputs": None,
-        "a station of 1000 vessels, two masses inputs": station(1000, ["v300", "v701"]),
+        "ISS with a ship, mass of the ship": variant(ISS_DG, ship),
+        "the same, masses, moments and poses of both": variant(ISS_DG, {"outputs": None, "inputs": both}),
+        "launch stack of seven parts, masses of four": variant(stack, {"outputs": None}),
+        "station of 1000 vessels, masses of two": station(1000, ["v300", "v701"]),
     }
-    scenes = {}
-    for name, tables in raw.items():
-        if tables is None:
-            scene = load_scene(EXAMPLES / "launch_stack.toml")
-            rotation = scene.rotation.model_copy(update={"propagator": "rk4"})
-            scenes[name] = scene.model_copy(update={"rotation": rotation})
-        else:
-            scenes[name] = parse_scene(variant(tables, by_rk4))
-    return scenes
+    by_rk4 = {"rotation.propagator": "rk4"}
+    return {name: parse_scene(variant(tables, by_rk4)) for name, tables in raw.items()}
 
 
 def operations(function: ca.Function) -> int:
@@ -70,6 +62,18 @@ def operations(function: ca.Function) -> int:
     return sum(kind not in NO_ARITHMETIC for kind in kinds)
 
 
-def all_operations(model: Equations) -> int:
-    """Returns the operations of everything that is generated for a scene."""
-    return sum(operations(function) for function in model.functions)
+def library_size(scene: Scene) -> int:
+    """Returns the bytes of the library that a scene's FMI 3.0 FMU has for x86_64 Linux, the whole file."""
+    sources, _ = generate(scene, 3)
+    packed = source_files(sources, 3, scene.name)
+    names = source_file_names(sources, 3)
+    binaries = compile_sources(packed, names, 3, [PLATFORM], scene.name)
+    (library,) = binaries.values()
+    return len(library)
+
+
+def table_row(name: str, scene: Scene) -> str:
+    """Returns the name, the operations and the size of a row, as the README has them."""
+    model = equations(scene)
+    composite, everything = operations(model.composite), sum(map(operations, model.functions))
+    return f"| {name} | {composite} | {everything} | {library_size(scene) / 1000:.0f} |"
