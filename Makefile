@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: run test check platforms robustness stability bench peers clean
+.PHONY: run test check platforms robustness stability bench slews peers clean
 
 run: .venv/installed
 	$(BIN)/python -m fmu_build examples/iss_dg.toml -o build/iss_dg.fmu
@@ -33,6 +33,11 @@ bench: .venv/installed-dev
 	$(BIN)/python tests/bench/twin.py
 	mkdir -p build
 	$(BIN)/supervessel trade examples/iss_dg.toml --duration 6000 -o build/iss_dg_trade
+
+slews: .venv/installed-dev
+	$(BIN)/python examples/nmpc_slew.py
+	$(BIN)/python examples/time_optimal.py
+	$(BIN)/python tests/bench/nmpc.py
 
 peers: .venv-peers/installed
 	PYTHONPATH=tests .venv-peers/bin/python tests/peers/peers.py

@@ -2,6 +2,8 @@
 
 import pytest
 
+from supervessel.trade.flight import workshop
+
 
 @pytest.fixture(scope="session", autouse=True)
 def cache(tmp_path_factory):
@@ -9,3 +11,10 @@ def cache(tmp_path_factory):
         folder = tmp_path_factory.mktemp("cache")
         patch.setenv("SUPERVESSEL_CACHE", str(folder))
         yield folder
+
+
+@pytest.fixture
+def shop():
+    """A workshop."""
+    with workshop() as shop:
+        yield shop

@@ -21,7 +21,7 @@ root = "B"
 mass = 2.0
 pmi = [1.0, 1.5, 2.0]
 [rotation]
-angular_velocity = [0.1, 0.2, 0.3]
+angular_velocity = [0.01, 0.02, 0.03]
 [experiment]
 duration = 10.0
 step = 1.0
@@ -111,6 +111,8 @@ def test_tables_are_printed_and_all_is_in_the_folder(finished):
     assert done.stdout == f"{table(found)}\n\nout\n"
     assert (folder / "out" / "trade.md").read_text() == f"{table(found)}\n"
     assert found["experiment"] == {"duration": 10.0, "step": 1.0, "inputs": {}}
+    divided = [(row["settings"], row["sub_steps"]) for row in found["choices"] if row["propagator"] == "rk4"]
+    assert divided == 2 * [(["0.05", "0.2"], 10), (["0.01"], 40)]  # 0.037 rad a step, under two laws
 
 
 def test_a_second_call_gives_the_same_bytes(finished, cache):

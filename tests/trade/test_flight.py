@@ -30,10 +30,10 @@ DOCKING = variant(
 """A ship that burns fuel, leaves and comes back while torque acts; the last step is half as long."""
 
 
-def test_the_host_flies_what_an_importer_flies():
+def test_the_host_flies_what_an_importer_flies(shop):
     scene = parse_scene(DOCKING)
     choice = Choice(BEST, "dop853", None, 1e-7)
-    flown = fly_all(scene, [choice], lambda _: None)[choice]
+    flown = fly_all(scene, [choice], shop)[choice]
     course = course_of(scene)
     instance = Instance(variant(DOCKING, {"rotation.tolerance": 1e-7}))
     try:
@@ -56,7 +56,7 @@ def test_the_host_flies_what_an_importer_flies():
     assert course.booleans["berth.docked"].tolist() == [1, 1, 1, 0, 0, 0, 1, 1, 1, 1]
 
 
-def test_sub_steps_are_counted():
+def test_sub_steps_are_counted(shop):
     """rk4 divides a step of 1 s at 1 rad/s, about a principal axis, into 20 sub-steps of at most 0.05 rad.
 
     The bound of the rate exceeds the rate by up to exp(0.05/(3 sqrt 3)) - 1 = 1 %: 21 are taken.
@@ -69,7 +69,7 @@ def test_sub_steps_are_counted():
         "experiment": {"duration": 3.0, "step": 1.0},
     }
     choice = Choice(BEST, "rk4", 0.05)
-    flown = fly_all(parse_scene(ball), [choice], lambda _: None)[choice]
+    flown = fly_all(parse_scene(ball), [choice], shop)[choice]
     assert flown.sub_steps == 3 * 21
     assert flown.samples[-1, :4] == pytest.approx([np.cos(1.5), 0.0, 0.0, np.sin(1.5)], abs=1e-6)
 

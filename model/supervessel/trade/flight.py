@@ -6,8 +6,9 @@ import platform
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import version
@@ -70,7 +71,28 @@ class _Built:
     references: dict[str, int]
 
 
-def fly_all(scene: Scene, choices: Sequence[Choice], done: Callable[[str], None]) -> dict[Choice, Flown]:
+@dataclass(frozen=True)
+class Workshop:
+    """Where a trade works: a folder for as long as it lasts, and what has been built there."""
+
+    folder: Path
+    built: dict[Choice, _Built]
+
+
+@contextmanager
+def workshop() -> Iterator[Workshop]:
+    """Yields a workshop, removed afterwards. Raises TradeError where there is no room for it or in it."""
+    try:
+        with tempfile.TemporaryDirectory(prefix="supervessel-") as name:
+            yield Workshop(Path(name), {})
+    except OSError as error:
+        place = error.filename or tempfile.gettempdir()
+        raise TradeError(f"{place}: no room to work in: {error.strerror}") from None
+
+
+def fly_all(
+    scene: Scene, choices: Sequence[Choice], shop: Workshop, done: Callable[[str], None] = lambda _: None
+) -> dict[Choice, Flown]:
     """Returns what came of choices; those not flown before are built, two at a time, then flown one by one.
 
     done : told of each that is finished
@@ -86,42 +108,32 @@ def fly_all(scene: Scene, choices: Sequence[Choice], done: Callable[[str], None]
             found[choice] = kept
             done(str(choice))
     missing = [choice for choice in choices if choice not in found]
-    if not missing:
-        return found
-    with tempfile.TemporaryDirectory(prefix="supervessel-") as name:
-        folder = Path(name)
-        try:
-            host = _host(folder)
-            built = _build_all(scene, missing, folder, done)
-            for choice in missing:
-                found[choice] = _fly(built[choice], host, choice, course, folder)
-                if found[choice].refused != OUT_OF_TIME:  # another time there may be more of it
-                    _keep(places[choice], found[choice])
-                done(str(choice))
-        except OSError as error:
-            raise TradeError(f"{error.filename or folder}: no room to work in: {error.strerror}") from None
+    _build_all(scene, missing, shop, done)
+    for choice in missing:
+        found[choice] = _fly(shop.built[_source_of(choice)], choice, course, shop.folder)
+        if found[choice].refused != OUT_OF_TIME:  # another time there may be more of it
+            _keep(places[choice], found[choice])
+        done(str(choice))
     return found
 
 
-def _build_all(
-    scene: Scene, choices: Sequence[Choice], folder: Path, done: Callable[[str], None]
-) -> dict[Choice, _Built]:
-    """Returns libraries; choices that differ in tolerance alone share one."""
-    sources = {choice: _source_of(choice) for choice in choices}
-    names = {source: f"b{i}" for i, source in enumerate(dict.fromkeys(sources.values()))}
+def _build_all(scene: Scene, choices: Sequence[Choice], shop: Workshop, done: Callable[[str], None]) -> None:
+    """Builds the libraries of choices, and the host's, as far as they are not there."""
+    wanted = [choice for choice in dict.fromkeys(map(_source_of, choices)) if choice not in shop.built]
+    if not wanted:
+        return
+    _build_host(shop.folder)
     pool = ThreadPoolExecutor(AT_ONCE)
     try:
         futures = {
-            source: pool.submit(_build, variant_of(scene, source), folder / name)
-            for source, name in names.items()
+            choice: pool.submit(_build, variant_of(scene, choice), shop.folder / f"b{len(shop.built) + i}")
+            for i, choice in enumerate(wanted)
         }
-        built = {}
-        for source, future in futures.items():
-            built[source] = future.result()
-            done(f"build {source}")
+        for choice, future in futures.items():
+            shop.built[choice] = future.result()
+            done(f"build {choice}")
     finally:
         pool.shutdown(cancel_futures=True)
-    return {choice: built[source] for choice, source in sources.items()}
 
 
 def _source_of(choice: Choice) -> Choice:
@@ -129,9 +141,9 @@ def _source_of(choice: Choice) -> Choice:
     return Choice(choice.model, choice.propagator, choice.angle)
 
 
-def builds(choices: Sequence[Choice]) -> int:
-    """Returns how many libraries choices need."""
-    return len({_source_of(choice) for choice in choices})
+def builds(choices: Sequence[Choice], shop: Workshop) -> int:
+    """Returns how many libraries choices need that are not there."""
+    return len({_source_of(choice) for choice in choices} - shop.built.keys())
 
 
 def _build(scene: Scene, folder: Path) -> _Built:
@@ -156,17 +168,22 @@ def _build(scene: Scene, folder: Path) -> _Built:
 
 
 def _host(folder: Path) -> Path:
-    """Returns host.c as a library."""
+    """Returns the place of host.c as a library."""
+    from fmu_build.platforms import host_platform  # noqa: PLC0415
+
+    return folder / f"host{host_platform().suffix}"
+
+
+def _build_host(folder: Path) -> None:
+    """Compiles host.c, unless that is done."""
     from fmu_build.compiler import compile_library  # noqa: PLC0415
     from fmu_build.platforms import host_platform  # noqa: PLC0415
 
-    host = host_platform()
-    library = folder / f"host{host.suffix}"
-    compile_library([HERE / "host.c"], host, library)
-    return library
+    if not _host(folder).exists():
+        compile_library([HERE / "host.c"], host_platform(), _host(folder))
 
 
-def _fly(built: _Built, host: Path, choice: Choice, course: Course, folder: Path) -> Flown:
+def _fly(built: _Built, choice: Choice, course: Course, folder: Path) -> Flown:
     """Returns what came of a flight in a process of its own."""
     moving = {name: v for name, v in course.numbers.items() if _is_input(built, choice, name)}
     numbers, booleans = folder / "numbers", folder / "booleans"
@@ -174,7 +191,7 @@ def _fly(built: _Built, host: Path, choice: Choice, course: Course, folder: Path
     booleans.write_bytes(_columns(course.booleans, course.steps, np.dtype(np.bool_)))
     shown = [f"{name}[{i}]" for name, n in zip(SHOWN, (4, 3), strict=True) for i in range(1, n + 1)]
     job = {
-        "host": str(host),
+        "host": str(_host(folder)),
         "library": str(built.library),
         "token": built.token,
         "tolerance": choice.tolerance or 0.0,

@@ -198,7 +198,7 @@ VISIBLE int trade_fly(const Functions *fmu, const Flight *flight, Report *report
     for (int round = 0; round < MOST_ROUNDS; round++) {
         const double spent = seconds_now() - begun;
         if (spent > flight->seconds && (round >= LEAST_ROUNDS || spent > 10.0 * flight->seconds)) break;
-        for (int i = 0; i < 4; i++) plain = smaller(plain, plain_seconds(&sink));
+        plain = smaller(plain, plain_seconds(&sink));
         f = begin(fmu, flight, report, false);
         if (!f) return 1;
         const bool again = fly(fmu, f, flight, report, NULL, least);

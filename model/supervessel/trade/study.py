@@ -21,7 +21,7 @@ from supervessel.trade.choices import (
     reference_choices,
 )
 from supervessel.trade.experiment import SLACK, Course, TradeError, course_of, experiment_of
-from supervessel.trade.flight import BUILT_WITH, Flown, builds, fly_all
+from supervessel.trade.flight import BUILT_WITH, Flown, Workshop, builds, fly_all, workshop
 
 Array = NDArray[np.float64]
 HALF_ULP = 2.0**-53
@@ -56,11 +56,12 @@ def study(scene: Scene, *, quick: bool = False, progress: Progress = lambda *_: 
     """
     course = course_of(scene)
     tried = models(scene, quick=quick)
-    count = _Count(progress)
-    references, refused = _references(scene, tried, course, count)
-    same = _same([model for model in tried if model in references], references)
-    kept = list(same)
-    flown = _ladders(scene, kept, count, quick=quick)
+    with workshop() as shop:
+        count = _Count(progress, shop)
+        references, refused = _references(scene, tried, course, count)
+        same = _same([model for model in tried if model in references], references)
+        kept = list(same)
+        flown = _ladders(scene, kept, count, quick=quick)
     best = references[BEST]
     rows = [
         _row(choice, result, course, references[choice.model].samples, best.samples)
@@ -68,9 +69,10 @@ def study(scene: Scene, *, quick: bool = False, progress: Progress = lambda *_: 
         if result.refused is None
     ]
     rows = _merged(rows)
+    angles = [choice.setting for choice in by_angle(BEST, quick=quick)]
     for row in rows:
-        if row["propagator"] == "rk4" and row["sub_steps"] == course.steps:  # no angle divides a step
-            row["settings"] = [choice.setting for choice in by_angle(BEST, quick=quick)]
+        if row["propagator"] == "rk4" and row["sub_steps"] == course.steps and angles[0] in row["settings"]:
+            row["settings"] = angles  # the finest divides no step: no other was flown
     order = [str(model) for model in kept]
     rows.sort(key=lambda row: (order.index(label(row)), row["propagator"], row["sub_steps"]))
     _mark_front(rows, float(best.doubt.attitude[-1]))
@@ -103,19 +105,19 @@ def study(scene: Scene, *, quick: bool = False, progress: Progress = lambda *_: 
 class _Count:
     """How far the trade has come."""
 
-    def __init__(self, progress: Progress) -> None:
-        self.progress, self.total, self.done = progress, 0, 0
+    def __init__(self, progress: Progress, shop: Workshop) -> None:
+        self.progress, self.shop, self.total, self.done = progress, shop, 0, 0
 
     def fly(self, scene: Scene, choices: Sequence[Choice]) -> dict[Choice, Flown]:
         """Returns what came of choices, and tells of each part of the work."""
         begun = self.done
-        self.total = begun + len(choices) + builds(choices)
+        self.total = begun + len(choices) + builds(choices, self.shop)
 
         def done(what: str) -> None:
             self.done += 1
             self.progress(self.done, self.total, what)
 
-        found = fly_all(scene, choices, done)
+        found = fly_all(scene, choices, self.shop, done)
         self.done = self.total
         return found
 
