@@ -15,9 +15,9 @@ from fmu_build.model_description import model_description
 from fmu_build.platforms import Platform, host_platform
 from fmu_build.reference_result import reference_result
 from fmu_build.sources import source_file_names, source_files
-from fmu_build.table import variable_table
+from fmu_build.table import Entry, variable_table
 from fmu_build.terminals import terminals_and_icons
-from supervessel.equations import equations
+from supervessel.equations import Equations, equations
 from supervessel.scene import Scene
 
 ARCHIVE_TIME = (1980, 1, 1, 0, 0, 0)
@@ -41,10 +41,17 @@ def build_fmu(scene: Scene, output: str | Path, fmi: int = 3, platforms: Sequenc
     output = Path(output)
     _check_output(output)
     platforms = platforms or (host_platform(),)
-    sources, description = generate(scene, fmi)
+    model = equations(scene)
+    entries = variable_table(scene, model)
+    sources, description = _generated(scene, model, entries, fmi)
     packed = source_files(sources, fmi, scene.name)
     binaries = compile_sources(packed, source_file_names(sources, fmi), fmi, platforms, scene.name)
-    content = {"modelDescription.xml": description, **packed, **binaries, **companions(scene, fmi)}
+    content = {
+        "modelDescription.xml": description,
+        **packed,
+        **binaries,
+        **companions(scene, model, entries, fmi),
+    }
     _write_archive(content, output)
     return output
 
@@ -52,7 +59,13 @@ def build_fmu(scene: Scene, output: str | Path, fmi: int = 3, platforms: Sequenc
 def generate(scene: Scene, fmi: int) -> tuple[dict[str, str], bytes]:
     """Returns what is particular to a scene: its C files by name, and modelDescription.xml."""
     model = equations(scene)
-    entries = variable_table(scene, model)
+    return _generated(scene, model, variable_table(scene, model), fmi)
+
+
+def _generated(
+    scene: Scene, model: Equations, entries: Sequence[Entry], fmi: int
+) -> tuple[dict[str, str], bytes]:
+    """Returns what `generate` does, from a scene's equations and variable table."""
     changing = model.change is not None
     loop = loop_tables(scene, model)
     functions = model.functions if loop is None else loop_functions(scene, model)
@@ -69,10 +82,8 @@ def generate(scene: Scene, fmi: int) -> tuple[dict[str, str], bytes]:
     return sources, model_description(scene, entries, token, fmi, names)
 
 
-def companions(scene: Scene, fmi: int) -> dict[str, bytes]:
+def companions(scene: Scene, model: Equations, entries: Sequence[Entry], fmi: int) -> dict[str, bytes]:
     """Returns documentation, icons, terminals and reference result by their paths in the archive."""
-    model = equations(scene)
-    entries = variable_table(scene, model)
     return {
         **documentation(scene, entries, fmi),
         "terminalsAndIcons/terminalsAndIcons.xml": terminals_and_icons(scene, entries, fmi),

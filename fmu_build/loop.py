@@ -85,20 +85,21 @@ def _port(scene: Scene, name: str, where: dict[str, int], tables: Tables) -> int
 def _bodies(scene: Scene, frame: int, inside: Places, where: dict[str, int], tables: Tables) -> list[str]:
     """Returns the rows of a group's bodies: what is constant, then vessels that vary."""
     rows = []
+    kind = "BODY" if frame else "BODY_OWN"
     constants, varying = constant_and_varying(scene, inside)
     if constants:
         mass, centre, inertia = lump(scene, {name: inside[name] for name in constants})
         held = tables.hold(centre, [inertia[i, j] for i, j in UPPER_TRIANGLE])
-        rows.append(f"{{BODY_FIXED, {frame}, {tables.hold(mass)}, {held}, {held}}}")
+        rows.append(f"{{{kind}_FIXED, {frame}, {tables.hold(mass)}, {held}, {held}}}")
     for name in varying:
         mass_at = where[f"{name}.mass"] if f"{name}.mass" in where else tables.hold(scene.vessels[name].mass)
         (centre,), (specific,) = seen_in_group(scene, {name: inside[name]})
         if name in scene.inputs.pmi:
             held = tables.hold(inside[name].rotation, centre)
-            rows.append(f"{{BODY_FREE, {frame}, {mass_at}, {held}, {where[f'{name}.pmi[1]']}}}")
+            rows.append(f"{{{kind}_FREE, {frame}, {mass_at}, {held}, {where[f'{name}.pmi[1]']}}}")
         else:
             held = tables.hold(centre, [specific[i, j] for i, j in UPPER_TRIANGLE])
-            rows.append(f"{{BODY_SCALED, {frame}, {mass_at}, {held}, {held}}}")
+            rows.append(f"{{{kind}_SCALED, {frame}, {mass_at}, {held}, {held}}}")
     return rows
 
 

@@ -9,6 +9,7 @@ from typing import Literal
 
 import casadi as ca
 
+from fmu_build.loop import LONGEST_CODE
 from supervessel.equations import Equations
 from supervessel.scene import Scene, keeps_momentum
 from supervessel.variables import (
@@ -99,9 +100,10 @@ def _dependencies(
     # principal moments and axes follow from every element of the inertia, and not linearly
     a = ca.repmat(ca.sumsqr(c[model.slices["inertia"]]), model.axes.numel_out(0))
     known = ca.vertcat(z, p, u)
+    rows_of = _rows if model.composite.n_instructions() <= LONGEST_CODE else _rows_by_structure
 
     def rows(unknowns: Mapping[Role, ca.SX]) -> Rows:
-        return {role: _rows(unknown, known, knowns, booleans) for role, unknown in unknowns.items()}
+        return {role: rows_of(unknown, known, knowns, booleans) for role, unknown in unknowns.items()}
 
     follows = _after_change(scene, model, z, p, c)
     now = rows(
@@ -146,6 +148,21 @@ def _rows(
             rows[row].append(Dependency(knowns[column], "dependent"))
         elif not element.is_zero():
             rows[row].append(Dependency(knowns[column], "constant" if element.is_constant() else "dependent"))
+    return [tuple(sorted(row, key=lambda d: d.reference)) for row in rows]
+
+
+def _rows_by_structure(
+    unknown: ca.SX, known: ca.SX, knowns: Sequence[int], booleans: Set[int]
+) -> list[tuple[Dependency, ...]]:
+    """Returns dependencies, row by row, none of which is said to be constant.
+
+    For composites so long that their Jacobian would take more than all the rest of a build.
+    """
+    sparsity = ca.jacobian_sparsity(unknown, known)
+    rows: list[list[Dependency]] = [[] for _ in range(sparsity.size1())]
+    dependent = {reference: Dependency(reference, "dependent") for reference in knowns}
+    for row, column in zip(*sparsity.get_triplet(), strict=True):
+        rows[row].append(dependent[knowns[column]])
     return [tuple(sorted(row, key=lambda d: d.reference)) for row in rows]
 
 

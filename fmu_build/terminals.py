@@ -51,8 +51,17 @@ class Terminal:
 def terminals(scene: Scene, entries: Sequence[Entry]) -> list[Terminal]:
     """Returns the terminals of a scene: ports whose pose is an input, docks, forces, torques, attitude."""
 
+    by_group: dict[tuple[str, str], list[Entry]] = {}
+    for entry in entries:
+        by_group.setdefault((entry.role, entry.variable.group), []).append(entry)
+
+    def members_of(role: str, *groups: str) -> list[Entry]:
+        """Returns the variables of a role whose group is among these, in the table's order."""
+        members = [entry for group in groups for entry in by_group.get((role, group), ())]
+        return sorted(members, key=lambda entry: entry.reference)
+
     def inputs(owner: str, kind: str, description: str, *parts: str, name: str = "") -> Terminal:
-        members = _members(entries, "input", *(f"{owner}.{part}" for part in parts))
+        members = members_of("input", *(f"{owner}.{part}" for part in parts))
         return Terminal(name or owner, kind, "plug", description, members, prefix=f"{owner}.")
 
     found = []
@@ -72,8 +81,8 @@ def terminals(scene: Scene, entries: Sequence[Entry]) -> list[Terminal]:
     for vessel in scene.inputs.vessel_torque:
         what = f"external torque on {vessel}, its axes"
         found.append(inputs(vessel, "torque", what, "torque", name=f"{vessel}.torque"))
-    torque = _members(entries, "input", "torque")
-    attitude = _members(entries, "output", "attitude", "angular_velocity")
+    torque = members_of("input", "torque")
+    attitude = members_of("output", "attitude", "angular_velocity")
     found.append(
         Terminal("torque", "torque", "plug", "external torque about the barycentre, body axes", torque)
     )
@@ -117,11 +126,6 @@ def terminal_icons(scene: Scene, entries: Sequence[Entry]) -> dict[str, bytes]:
         files[f"terminalsAndIcons/{kind}.png"] = png(figure)
         files[f"terminalsAndIcons/{kind}.svg"] = svg(figure).encode()
     return files
-
-
-def _members(entries: Sequence[Entry], role: str, *groups: str) -> list[Entry]:
-    """Returns the variables of a role whose name without index is among `groups`, in the table's order."""
-    return [entry for entry in entries if entry.role == role and entry.variable.group in groups]
 
 
 def _write(parent: ET.Element, terminal: Terminal, side: float, place: int, count: int) -> None:

@@ -16,9 +16,12 @@ typedef struct {
 /* Sums are read and written in one place: each element of theirs follows from the same element before. */
 typedef int Kernel(const double **arg, double **res, int *iw, double *w, int mem);
 
-static Kernel *const SEE[] = {loop_fixed, loop_scaled, loop_free};
-static Kernel *const SEE_FORWARD[] = {loop_fixed_forward, loop_scaled_forward, loop_free_forward};
-static Kernel *const SEE_REVERSE[] = {loop_fixed_reverse, loop_scaled_reverse, loop_free_reverse};
+static Kernel *const SEE[] = {loop_fixed, loop_scaled, loop_free,
+        loop_own_fixed, loop_own_scaled, loop_own_free};
+static Kernel *const SEE_FORWARD[] = {loop_fixed_forward, loop_scaled_forward, loop_free_forward,
+        loop_own_fixed_forward, loop_own_scaled_forward, loop_own_free_forward};
+static Kernel *const SEE_REVERSE[] = {loop_fixed_reverse, loop_scaled_reverse, loop_free_reverse,
+        loop_own_fixed_reverse, loop_own_scaled_reverse, loop_own_free_reverse};
 
 static const double NOTHING[POSE];
 

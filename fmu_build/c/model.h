@@ -52,6 +52,15 @@ int loop_scaled_reverse(const double **arg, double **res, int *iw, double *w, in
 int loop_free(const double **arg, double **res, int *iw, double *w, int mem);         /* the same */
 int loop_free_forward(const double **arg, double **res, int *iw, double *w, int mem);
 int loop_free_reverse(const double **arg, double **res, int *iw, double *w, int mem);
+int loop_own_fixed(const double **arg, double **res, int *iw, double *w, int mem);    /* the same */
+int loop_own_fixed_forward(const double **arg, double **res, int *iw, double *w, int mem);
+int loop_own_fixed_reverse(const double **arg, double **res, int *iw, double *w, int mem);
+int loop_own_scaled(const double **arg, double **res, int *iw, double *w, int mem);   /* the same */
+int loop_own_scaled_forward(const double **arg, double **res, int *iw, double *w, int mem);
+int loop_own_scaled_reverse(const double **arg, double **res, int *iw, double *w, int mem);
+int loop_own_free(const double **arg, double **res, int *iw, double *w, int mem);     /* the same */
+int loop_own_free_forward(const double **arg, double **res, int *iw, double *w, int mem);
+int loop_own_free_reverse(const double **arg, double **res, int *iw, double *w, int mem);
 int loop_weigh(const double **arg, double **res, int *iw, double *w, int mem);        /* sum, mass, seen, first -> sum */
 int loop_weigh_forward(const double **arg, double **res, int *iw, double *w, int mem);
 int loop_weigh_reverse(const double **arg, double **res, int *iw, double *w, int mem);

@@ -33,6 +33,7 @@ def kernels(scene: Scene) -> tuple[ca.Function, ...]:
     scaled      : the same, with the inertia over mass
     free        : pose, mass, rotation into the group's axes and centre there (12,), moments over mass (3,)
                   -> seen
+    own_...     : the same three for the root's own group, whose pose is not needed
     weigh       : sum, mass, seen, centre of the first body -> sum
     middle      : sum -> barycentre from the first centre
     add         : inertia (6,), mass, seen, centre of the first, middle -> inertia with that body
@@ -60,6 +61,9 @@ def kernels(scene: Scene) -> tuple[ca.Function, ...]:
         "fixed": ([pose, mass, held, moments], _seen(fixed, pose)),
         "scaled": ([pose, mass, held, moments], _seen(scaled, pose)),
         "free": ([pose, mass, inside, moments], _seen(turned, pose)),
+        "own_fixed": ([pose, mass, held, moments], _flat_body(fixed)),
+        "own_scaled": ([pose, mass, held, moments], _flat_body(scaled)),
+        "own_free": ([pose, mass, inside, moments], _flat_body(turned)),
         "weigh": ([total, mass, seen, first], total + ca.vertcat(mass, mass * offset)),
         "middle": ([total], total[1:] / total[0]),
         "add": (
@@ -98,5 +102,8 @@ def _port(numbers: ca.SX) -> tuple[ca.SX, ca.SX]:
 def _seen(body: Body, pose: ca.SX) -> ca.SX:
     """Returns a body of a group, (9,), seen from the root's axes."""
     placed = _as_pose(pose)
-    there = body.seen_from(placed.rotation, placed.origin)
-    return ca.vertcat(there.centre, upper_triangle(there.inertia))
+    return _flat_body(body.seen_from(placed.rotation, placed.origin))
+
+
+def _flat_body(body: Body) -> ca.SX:
+    return ca.vertcat(body.centre, upper_triangle(body.inertia))

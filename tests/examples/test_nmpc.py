@@ -21,8 +21,11 @@ import nmpc_slew as slew  # noqa: E402
 U = 2.0**-53
 OPERATIONS = 1e4
 """Of one stage's Hessian, at most: each adds a rounding."""
-TORQUE_ERROR = slew.TOLERANCE / 0.01
-"""Of a torque over its limit: gradient left by the solver over the least curvature, that of the effort."""
+TOLERANCE = 1e-8
+"""Of the solvers here, for what they find to be comparable."""
+TORQUE_ERROR = np.sqrt(TOLERANCE / 0.04)
+"""Of a torque over its limit: where a limit just acts, distance times multiplier is the tolerance, and the
+multiplier is the distance times the curvature, that of the effort at least."""
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +45,9 @@ def problem(twin):
 
 @pytest.fixture(scope="module")
 def solvers(twin, problem, folder):
-    return nmpc.solvers(twin, problem, folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(slew, "TOLERANCE", TOLERANCE)
+        return nmpc.solvers(twin, problem, folder)
 
 
 @pytest.fixture(scope="module")

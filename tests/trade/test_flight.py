@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from fmu_build.compiler import FLAGS, compile_library
+from fmu_build.platforms import host_platform
 from supervessel import parse_scene
 from supervessel.trade.choices import BEST, Choice, Model, models, reference_choices, variant_of
 from supervessel.trade.experiment import course_of
-from supervessel.trade.flight import fly_all
+from supervessel.trade.flight import HERE, fly_all
 from support import ISS_DG, OK, Instance, variant
 
 COURSES = {
@@ -95,3 +97,9 @@ def test_every_model_of_a_scene_with_moving_parts_is_a_scene():
         for choice in reference_choices(scene, model):
             assert choice.propagator == "dop853"
             variant_of(scene, choice)
+
+
+def test_the_host_compiles_without_warnings(tmp_path):
+    strict = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wstrict-prototypes", "-Werror")
+    platform = host_platform()
+    compile_library([HERE / "host.c"], platform, tmp_path / f"host{platform.suffix}", (*FLAGS, *strict))

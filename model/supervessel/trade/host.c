@@ -1,7 +1,7 @@
 /* Flies the library of an FMI 3.0 co-simulation FMU through an experiment, and times that beside a plain RK4 step.
    Built as a shared library; host.py loads it and the FMU's, and hands the FMU's functions over. */
 #ifndef _WIN32
-#define _POSIX_C_SOURCE 199309L
+#define _POSIX_C_SOURCE 200112L
 #endif
 #include <math.h>
 #include <stdbool.h>
@@ -122,7 +122,7 @@ static double plain_seconds(double *sink) {
     }
     const double taken = seconds_now() - start;
     *sink += x[0] + x[4];
-    return taken / PLAIN_STEPS;
+    return taken / (double)PLAIN_STEPS;
 }
 
 static void note(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category, fmi3String message) {

@@ -46,7 +46,13 @@ class _Reference:
 
 
 def study(scene: Scene, *, quick: bool = False, progress: Progress = lambda *_: None) -> dict[str, Any]:
-    """Returns the trade of a scene as JSON lays it out, see `README.md`.
+    """Returns the trade of a scene, as trade.json lays it out.
+
+    Errors are the largest up to each of `horizons` [s] in lists, up to the end as single numbers: of the
+    attitude [rad] and of the rate [rad/s], against the law tensor with all inputs moving; `integration_...`
+    against the own law. doubt: how far two ways to the reference are apart. models: what each leaves out, and
+    those that move the `same`. choices: errors and costs, Pareto front marked; settings that move the same
+    are one. refused: what could not be flown, and why.
 
     scene    : with an experiment
     quick    : fewer laws, steps and tolerances
