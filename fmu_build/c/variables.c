@@ -192,7 +192,7 @@ Status instance_set(Instance *instance, const unsigned references[], size_t coun
         if (status != STATUS_OK) return status;
     }
 #if CHANGES
-    const bool holds_states = hold_states(references, count);
+    const bool holds_states = (instance->now.state & (EVENT | CONTINUOUS)) && hold_states(references, count);
     const Status status = holds_states ? before_states(instance) : STATUS_OK;
     if (status != STATUS_OK) return status;
 #endif

@@ -12,9 +12,9 @@ from fmu_build.compiler import FLAGS, compile_library
 from fmu_build.loop import LONGEST_CODE, loop_tables
 from fmu_build.platforms import host_platform
 from fmu_build.sources import source_files
-from supervessel import Scene, parse_scene
+from supervessel import Scene, Twin, parse_scene
 from supervessel.equations import Equations, equations, p_start
-from support import EPS, ISS_DG, scene, variant
+from support import EPS, ISS_DG, OK, flying, scene, variant
 from support.costs import station
 
 VISIBLE = [flag for flag in FLAGS if flag not in ("-fvisibility=hidden", "-s")]
@@ -148,3 +148,16 @@ def test_a_short_composite_is_straight_code():
 def test_what_a_loop_does_not_know_is_straight_code(more):
     scene = parse_scene(variant(everything(), more))
     assert loop_tables(scene, equations(scene)) is None
+
+
+def test_an_fmu_with_a_loop_flies_as_the_twin_does():
+    raw = everything()
+    twin = Twin(scene(raw))
+    with flying(
+        raw, **{"v5.mass": 1500.0, "v3.root.position": [1.2, 0.0, 0.3], "torque": [10.0, 20.0, -30.0]}
+    ) as fmu:
+        assert fmu.step(0.01) == OK
+        p = np.array([fmu.get(name) for name in twin.p_names])
+        truth = twin.step(twin.x_start, [10.0, 20.0, -30.0], p, 0.01)
+        got = np.concatenate([fmu.get("attitude"), fmu.get("angular_velocity")])
+    np.testing.assert_array_equal(got, np.array(truth).ravel())

@@ -45,6 +45,7 @@ def turns(tmp_path_factory):
     """Scene, limit, axis and the example's result, of the sphere and of the ISS about y."""
     folder = tmp_path_factory.mktemp("turns")
     iss = tomllib.loads((ROOT / "examples" / "iss_dg.toml").read_text())
+    del iss["experiment"]
     cases = []
     for raw, limit, axis in ((example.SPHERE, 1.0, 2), (iss, 3000.0, 1)):
         scene = parse_scene(raw | {"inputs": {"torque": True}})
