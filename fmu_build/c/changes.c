@@ -218,6 +218,13 @@ static Status check_continuous(Instance *instance, const double p[]) {
 
 #endif
 
+void changes_begin(Instance *instance) {
+    Dynamics *now = &instance->now;
+    if (now->model_exchange || memcmp(now->p, now->stepped_p, INPUT_P_COUNT * sizeof(double)) != 0) return;
+    memcpy(now->kept_rate, instance_x(instance) + 4, sizeof now->kept_rate);
+    memcpy(now->kept_c, now->c, sizeof now->kept_c);
+}
+
 Status changes_apply(Instance *instance, const double p[], const double c[]) {
     Dynamics *now = &instance->now;
     double rate[3];
@@ -236,6 +243,7 @@ Status changes_apply(Instance *instance, const double p[], const double c[]) {
         instance_state_moved(instance);
         return STATUS_OK;
     }
+    changes_begin(instance);
     const Status status = rate_after(instance, p, c, rate);
     if (status != STATUS_OK) return status;
     become_current(instance, p, c);
@@ -355,6 +363,7 @@ typedef struct {
 
 /* Of kinds that keep the rate, those before the one that keeps momentum belong to both stages. */
 static Status stages_of(Instance *instance, Stages *stages) {
+    changes_begin(instance);
     const Dynamics *now = &instance->now;
     stages->varied_before = MASSES_KEEP_MOMENTUM ? 0 : KIND_MASS;
     stages->varied_after = MASSES_KEEP_MOMENTUM ? KIND_MASS : KIND_MASS | KIND_POSE;

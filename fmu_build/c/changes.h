@@ -36,6 +36,10 @@ static inline unsigned changes_state(const Instance *instance) {
 /* Makes the rate follow from a change to p, whose composite is c; they become current if it can. */
 Status changes_apply(Instance *instance, const double p[], const double c[]);
 
+/* In co-simulation, unless inputs have changed since the last step: the rate and the composite are those that the next
+   change begins from. A step need not tell. */
+void changes_begin(Instance *instance);
+
 /* The inputs and the rate as they are now are those that the next change begins from. */
 void changes_commit(Instance *instance);
 
@@ -56,6 +60,7 @@ static inline Status changes_end_event(Instance *instance, bool *states_changed)
     *states_changed = false;
 #if CHANGES
     if (status == STATUS_OK) {
+        changes_begin(instance);
         *states_changed = changes_moved(instance);
         changes_commit(instance);
     }

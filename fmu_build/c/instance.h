@@ -68,7 +68,7 @@ typedef struct {
     double kept_momentum[3];          /* N.m.s, of the states when changes were committed last */
 #endif
 #if CHANGES
-    double kept_rate[3];              /* rad/s, when changes were committed last, with stepped_p */
+    double kept_rate[3];              /* rad/s, that a change of inputs began from, with stepped_p */
     double kept_c[COMPOSITE_COUNT];   /* the composite of stepped_p */
 #endif
     double p[INPUT_P_COUNT + 1];      /* the composite's inputs, directions scaled; + 1: may be none */

@@ -422,10 +422,6 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
         }
     }
     now->epoch_holds = progress.was_free;
-#if CHANGES
-    memcpy(now->kept_rate, instance_x(instance) + 4, sizeof now->kept_rate);
-    if (progress.composite_changed) memcpy(now->kept_c, now->c, sizeof now->kept_c);
-#endif
     memcpy(now->stepped_p, now->p, sizeof now->p);
     return STATUS_OK;
 }
