@@ -52,6 +52,14 @@ static Status weigh(Instance *instance, Stage *stage) {
     return status;
 }
 
+/* Where a change to p begins: all as committed, but for the docks that open. */
+static void first_stage(const Instance *instance, const double p[], Stage *stage) {
+    copy_p(stage->p, instance->now.stepped_p);
+    memcpy(stage->c, instance->now.kept_c, sizeof stage->c);
+    stage->c_is_current = true;
+    move_stage(stage, p, KIND_DOCKED);
+}
+
 /* Goes on from a stage to one where inputs of some kinds are as in p, keeping the momentum. */
 static Status keep(Instance *instance, Stage *stage, const double p[], unsigned kinds, double rate[3]) {
     Stage next = *stage;
@@ -72,11 +80,9 @@ static Status keep(Instance *instance, Stage *stage, const double p[], unsigned 
 
 /* The angular velocity before docks close, after all else has changed to p. */
 static Status rate_kept(Instance *instance, const double p[], double rate[3]) {
-    Stage stage = {.c_is_current = true};
+    Stage stage;
     Status status = STATUS_OK;
-    copy_p(stage.p, instance->now.stepped_p);
-    memcpy(stage.c, instance->now.kept_c, sizeof stage.c);
-    move_stage(&stage, p, KIND_DOCKED);
+    first_stage(instance, p, &stage);
 #if MASSES_KEEP_MOMENTUM
     status = keep(instance, &stage, p, KIND_MASS, rate);
 #else
@@ -367,10 +373,8 @@ static Status stages_of(Instance *instance, Stages *stages) {
     const Dynamics *now = &instance->now;
     stages->varied_before = MASSES_KEEP_MOMENTUM ? 0 : KIND_MASS;
     stages->varied_after = MASSES_KEEP_MOMENTUM ? KIND_MASS : KIND_MASS | KIND_POSE;
-    copy_p(stages->before.p, now->stepped_p);
-    memcpy(stages->before.c, now->kept_c, sizeof now->kept_c);
-    stages->before.c_is_current = true;
-    move_stage(&stages->before, now->p, KIND_DOCKED | stages->varied_before);
+    first_stage(instance, now->p, &stages->before);
+    move_stage(&stages->before, now->p, stages->varied_before);
     stages->after = stages->before;
     move_stage(&stages->after, now->p, stages->varied_after);
     const Status status = weigh(instance, &stages->before);

@@ -225,18 +225,18 @@ def equations(scene: Scene) -> Equations:
         shown = a[slices["principal"]] if "principal" in slices else ca.SX.zeros(7)
         return _outputs(scene, x, u, parts | {"principal": shown, "error_estimate": e})
 
-    y = outputs_from(x_of_z)
-    z_rate = rate(x)
+    y, z_rate = y_of_x, x_rate = outputs_from(x), rate(x)
     if by_momentum:
+        y = outputs_from(x_of_z)
         turning = ca.cross(x_of_z[4:], z[4:]) if law.gyroscopic_term else ca.SX.zeros(3)
         z_rate = ca.vertcat(attitude_dot(z[:4], x_of_z[4:]), torque - turning)
     state_args, state_names = [state, u, c], ["z" if by_momentum else "x", "u", "c"]
     return Equations(
         composite=ca.Function("composite", [p], [c_of_p], ["p"], ["c"]),
         axes=ca.Function("axes", [c], [a_of_c], ["c"], ["a"]),
-        ode=ca.Function("ode", args, [rate(x)], names, ["x_dot"]),
+        ode=ca.Function("ode", args, [x_rate], names, ["x_dot"]),
         state_ode=ca.Function("ode", state_args, [z_rate], state_names, [f"{state_names[0]}_dot"]),
-        outputs=ca.Function("outputs", [*args, a, e], [outputs_from(x)], [*names, "a", "e"], ["y"]),
+        outputs=ca.Function("outputs", [*args, a, e], [y_of_x], [*names, "a", "e"], ["y"]),
         state_outputs=ca.Function("outputs", [*state_args, a, e], [y], [*state_names, "a", "e"], ["y"]),
         fastest_square=steps[0],
         step=steps[1],
@@ -282,10 +282,9 @@ def _axes(scene: Scene, plan: Plan, inertia: ca.SX, products: ca.SX) -> tuple[di
     if in_series:
         own = ca.diag(products) if products.numel() and not mapped else ca.SX(0, 1)
         parts["series"] = ca.vertcat(principal_products(moments), ca.vec(axes)) if mapped else own
-    slices, end = {}, 0
-    for name, part in parts.items():
-        slices[name] = slice(end, end := end + part.numel())
-    return slices, ca.densify(ca.vertcat(ca.SX(0, 1), *parts.values()))
+    return _slices({name: part.numel() for name, part in parts.items()}), ca.densify(
+        ca.vertcat(ca.SX(0, 1), *parts.values())
+    )
 
 
 def _axes_change(inertia: ca.SX, c: ca.SX, a: ca.SX, slices: Mapping[str, slice]) -> tuple[ca.SX, ca.SX]:
