@@ -107,7 +107,6 @@ def scene_header(
     }
     plan = model.plan
     macros = {
-        "DOCKED_COUNT": len(scene.inputs.docked),
         "AXES_COUNT": model.axes.numel_out(0),
         **change_constants(scene, model),
         **loop_constants(loop),

@@ -23,7 +23,7 @@ static Status check_roles(Instance *instance, const unsigned references[], size_
         if (!(allowed & (1u << VARIABLES[references[i]].role)))
             return instance_error(instance, "%s cannot be %s of a derivative here", VARIABLES[references[i]].name,
                                   what);
-#if DOCKED_COUNT
+#if DOCK_COUNT
     for (size_t i = 0; i < count; i++)
         if (VARIABLES[references[i]].type == TYPE_BOOLEAN)
             return instance_error(instance, "%s cannot be %s of a derivative: it is a Boolean",

@@ -141,7 +141,7 @@ fmi2Status fmi2SetReal(fmi2Component instance, const fmi2ValueReference referenc
     return (fmi2Status)instance_set(instance, references, count, values);
 }
 
-#if DOCKED_COUNT
+#if DOCK_COUNT
 
 fmi2Status fmi2GetBoolean(fmi2Component instance, const fmi2ValueReference references[], size_t count,
                           fmi2Boolean values[]) {

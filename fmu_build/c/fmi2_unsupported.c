@@ -13,7 +13,7 @@ static fmi2Status unsupported(Instance *instance, const Call *call) {
     return (fmi2Status)instance_error(instance, "belongs to a capability that this FMU does not have");
 }
 
-#if DOCKED_COUNT
+#if DOCK_COUNT
 #define BOOLEAN(X)
 #define TYPES "all variables are Real or Boolean"
 #else

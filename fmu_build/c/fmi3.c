@@ -12,7 +12,7 @@ enum { REPORT_SIZE = 256 };
 
 /* Co-simulation has an event mode where docks open and close. */
 enum {
-    HAS_EVENT_MODE = DOCKED_COUNT > 0,
+    HAS_EVENT_MODE = DOCK_COUNT > 0,
     EVENT_FOLLOWS = HAS_EVENT_MODE ? STEPPING | CONTINUOUS : CONTINUOUS,
     ONLY_EXCHANGE = HAS_EVENT_MODE ? ONLY_MODEL_EXCHANGE : 0
 };
@@ -206,7 +206,7 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference refere
     return (fmi3Status)instance_set(instance, references, count, values);
 }
 
-#if DOCKED_COUNT
+#if DOCK_COUNT
 
 fmi3Status fmi3GetBoolean(fmi3Instance instance, const fmi3ValueReference references[], size_t count,
                           fmi3Boolean values[], size_t value_count) {

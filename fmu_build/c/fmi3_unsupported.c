@@ -13,7 +13,7 @@ static fmi3Status unsupported(Instance *instance, const Call *call) {
     return (fmi3Status)instance_error(instance, "belongs to a capability that this FMU does not have");
 }
 
-#if DOCKED_COUNT
+#if DOCK_COUNT
 #define BOOLEAN(X)
 #define STEP_MODE(X)
 #define TYPES "all variables are Float64 or Boolean"

@@ -13,7 +13,7 @@ static Status unknown_reference(Instance *instance, unsigned reference) {
 }
 
 static bool is_boolean(unsigned reference) {
-#if DOCKED_COUNT
+#if DOCK_COUNT
     return VARIABLES[reference].type == TYPE_BOOLEAN;
 #else
     (void)reference;
@@ -212,7 +212,7 @@ Status instance_set(Instance *instance, const unsigned references[], size_t coun
     return STATUS_OK;
 }
 
-#if DOCKED_COUNT
+#if DOCK_COUNT
 
 Status instance_check_booleans(Instance *instance, const unsigned references[], size_t count, const void *values) {
     if (count == 0) return STATUS_OK;

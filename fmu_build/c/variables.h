@@ -36,7 +36,7 @@ typedef struct {
     Role role;
     Check check;
     unsigned follows;
-#if DOCKED_COUNT
+#if DOCK_COUNT
     Type type; /* the values of a Boolean are 0 and 1 */
 #endif
 } Variable;

@@ -193,44 +193,28 @@ def equations(scene: Scene) -> Equations:
     products = _without_zeros(law.gyroscopic(parts["law"]))
     slices, a_of_c = _axes(scene, plan, inertia, products)
     a, e = ca.SX.sym("a", a_of_c.numel()), ca.SX.sym("e")
-    by_torque = law.acceleration(parts["law"], ca.SX.zeros(3), torque)
-    angle = scene.rotation.max_angle_step
-    fastest = fastest_square(
-        x[4:], by_torque, law.growth, angle, None if spin is None else parts["momentum"][3]
-    )
     with_error = "error_estimate" in scene.outputs.names
     motion = Motion(x, rate, law, parts["law"], torque, h, scene.rotation.tolerance, with_error)
-    method = plan.method or PROPAGATORS["dop853"]
-    assert method.build is not None
-    step = method.build(motion)
-    results = [step.state] if step.error is None else [step.state, step.error]
-    args, names = [x, u, c], ["x", "u", "c"]
-    steps = [
-        ca.Function("fastest_square", args, [fastest], names, ["rate_square"]),
-        ca.Function("step", [*args, h], results, [*names, "h"], ["x_next", "error"][: len(results)]),
-    ]
-    series = ca.Function("by_torque", [u, c], [by_torque], ["u", "c"], ["acceleration"])
-    propagation = (
-        {"angle": steps, "error": steps[1:], "series": [series]}[plan.method.control] if plan.method else []
-    )
+    rate_square, step, propagation, exponent = _steps(scene, plan, motion, parts, spin, u, c)
     if plan.free != "never":
         propagation += free_functions(a.numel(), slices["free"])
-    change = change_functions(scene, c, parts_of, p, k) if changes_rate(scene) else None
-    z = ca.SX.sym("z", 7)
-    by_momentum = change is not None and keeps_momentum(scene)
-    x_of_z = ca.vertcat(z[:4], change.rate_of_momentum(z[4:], c)) if change and by_momentum else x
-    state = z if by_momentum else x
 
     def outputs_from(x: ca.SX) -> ca.SX:
         shown = a[slices["principal"]] if "principal" in slices else ca.SX.zeros(7)
         return _outputs(scene, x, u, parts | {"principal": shown, "error_estimate": e})
 
+    args, names = [x, u, c], ["x", "u", "c"]
+    state_args, state_names = args, names
     y, z_rate = y_of_x, x_rate = outputs_from(x), rate(x)
-    if by_momentum:
-        y = outputs_from(x_of_z)
-        turning = ca.cross(x_of_z[4:], z[4:]) if law.gyroscopic_term else ca.SX.zeros(3)
-        z_rate = ca.vertcat(attitude_dot(z[:4], x_of_z[4:]), torque - turning)
-    state_args, state_names = [state, u, c], ["z" if by_momentum else "x", "u", "c"]
+    change = change_functions(scene, c, parts_of, p, k) if changes_rate(scene) else None
+    by_momentum = change is not None and keeps_momentum(scene)
+    if change is not None and by_momentum:
+        z = ca.SX.sym("z", 7)
+        state_args, state_names = [z, u, c], ["z", "u", "c"]
+        omega = change.rate_of_momentum(z[4:], c)
+        y = outputs_from(ca.vertcat(z[:4], omega))
+        turning = ca.cross(omega, z[4:]) if law.gyroscopic_term else ca.SX.zeros(3)
+        z_rate = ca.vertcat(attitude_dot(z[:4], omega), torque - turning)
     return Equations(
         composite=ca.Function("composite", [p], [c_of_p], ["p"], ["c"]),
         axes=ca.Function("axes", [c], [a_of_c], ["c"], ["a"]),
@@ -238,8 +222,8 @@ def equations(scene: Scene) -> Equations:
         state_ode=ca.Function("ode", state_args, [z_rate], state_names, [f"{state_names[0]}_dot"]),
         outputs=ca.Function("outputs", [*args, a, e], [y_of_x], [*names, "a", "e"], ["y"]),
         state_outputs=ca.Function("outputs", [*state_args, a, e], [y], [*state_names, "a", "e"], ["y"]),
-        fastest_square=steps[0],
-        step=steps[1],
+        fastest_square=rate_square,
+        step=step,
         propagation=tuple(propagation),
         product_count=products.size2(),
         **derivatives("composite", [p], [c_of_p]),
@@ -249,13 +233,49 @@ def equations(scene: Scene) -> Equations:
         plan=plan,
         slices=where,
         axes_slices=slices,
-        error_exponent=step.exponent,
+        error_exponent=exponent,
         p_names=p_names,
         k_names=k_names,
         u_names=u_names,
         x_names=tuple(variable.name for variable in state_variables(scene)),
         y_names=output_names(scene),
     )
+
+
+def _steps(  # noqa: PLR0913, PLR0917
+    scene: Scene,
+    plan: Plan,
+    motion: Motion,
+    parts: Mapping[str, ca.SX],
+    spin: ca.SX | None,
+    u: ca.SX,
+    c: ca.SX,
+) -> tuple[ca.Function, ca.Function, list[ca.Function], int]:
+    """Returns fastest_square and step of `Equations`, what of both its co-simulation uses, and the power of
+    the step that its error grows with.
+
+    Where a scene has exact motion alone, the step is that of dop853.
+    """
+    by_torque = motion.acceleration_by_torque
+    fastest = fastest_square(
+        motion.state[4:],
+        by_torque,
+        motion.law.growth,
+        scene.rotation.max_angle_step,
+        None if spin is None else parts["momentum"][3],
+    )
+    method = plan.method or PROPAGATORS["dop853"]
+    assert method.build is not None
+    built = method.build(motion)
+    results = [built.state] if built.error is None else [built.state, built.error]
+    args, names = [motion.state, u, c], ["x", "u", "c"]
+    rate_square = ca.Function("fastest_square", args, [fastest], names, ["rate_square"])
+    step = ca.Function(
+        "step", [*args, motion.step], results, [*names, "h"], ["x_next", "error"][: len(results)]
+    )
+    series = ca.Function("by_torque", [u, c], [by_torque], ["u", "c"], ["acceleration"])
+    used = {"angle": [rate_square, step], "error": [step], "series": [series]}
+    return rate_square, step, used[plan.method.control] if plan.method else [], built.exponent
 
 
 def _without_zeros(products: ca.SX) -> ca.SX:
