@@ -9,11 +9,14 @@ of two rates: `products` and `gyroscopic`.
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import sqrt
+from typing import TYPE_CHECKING
 
 import casadi as ca
 
 from supervessel.inertia import from_upper_triangle, ldl, ldl_inverse, upper_triangle
-from supervessel.scene import Law
+
+if TYPE_CHECKING:
+    from supervessel.scene import Law
 
 GYROSCOPIC_GROWTH = 1.0 / (3.0 * sqrt(3.0))
 """Largest growth rate of |omega| by the gyroscopic term, over |omega|^2.
@@ -147,7 +150,7 @@ def principal_products(moments: ca.SX) -> ca.SX:
     return ca.vertcat(*((moments[i - 2] - moments[i - 1]) / moments[i] for i in range(3)))
 
 
-LAWS: dict[Law, RotationLaw] = {
+LAWS: "dict[Law, RotationLaw]" = {
     "none": RotationLaw(_nothing, _keep, 0.0, (), _no_products, _spherical, _whole),
     "decoupled": RotationLaw(_reciprocal_moments, _decoupled, 0.0, (), _no_products, _spherical, _diagonal),
     "principal": RotationLaw(

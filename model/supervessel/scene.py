@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from supervessel.problems import quantity
+from supervessel.propagators import PROPAGATORS
 from supervessel.quantities import (
     Angle,
     AngularVelocity,
@@ -119,7 +120,7 @@ Flag = Annotated[bool, BeforeValidator(_flag)]
 Convention = Literal["rigid_body", "orbiter"]
 Law = Literal["none", "decoupled", "principal", "tensor"]
 Kept = Literal["rate", "momentum"]
-Propagator = Literal["auto", "rk4", "dop853", "taylor", "exact", "split"]
+PROPAGATOR_NAMES = ("auto", *PROPAGATORS)
 
 
 class Port(Table):
@@ -202,7 +203,7 @@ class Rotation(Table):
     """
 
     law: Annotated[Law, _one_of(*get_args(Law))] = "tensor"
-    propagator: Annotated[Propagator, _one_of(*get_args(Propagator))] = "auto"
+    propagator: Annotated[str, _one_of(*PROPAGATOR_NAMES)] = "auto"
     tolerance: Tolerance = 1e-9
     max_angle_step: Angle = 0.05
     mass_change: Annotated[Kept, _one_of(*get_args(Kept))] = "rate"

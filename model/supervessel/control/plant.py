@@ -15,7 +15,7 @@ from supervessel.control.inputs import placed_values, settled
 from supervessel.equations import composite_slices, equations, p_start, simplification
 from supervessel.inertia import from_upper_triangle
 from supervessel.propagators.exact import free_step
-from supervessel.scene import Propagator, Scene
+from supervessel.scene import PROPAGATOR_NAMES, Scene
 
 GAP = 1e-8
 """Least difference of principal moments, over the largest, for derivatives of free motion by p."""
@@ -35,13 +35,13 @@ class Plant:
         self,
         scene: Scene,
         *,
-        propagator: Propagator | None = None,
+        propagator: str | None = None,
         doublings: int = 8,
         error_form: ErrorForm = "rotvec",
         fixed: bool | Iterable[str] | Mapping[str, ArrayLike] = False,
     ) -> None:
-        if propagator not in (None, *get_args(Propagator)):
-            raise ValueError(f"propagator = {propagator!r}: must be one of {', '.join(get_args(Propagator))}")
+        if propagator not in (None, *PROPAGATOR_NAMES):
+            raise ValueError(f"propagator = {propagator!r}: must be one of {', '.join(PROPAGATOR_NAMES)}")
         if error_form not in get_args(ErrorForm):
             raise ValueError(f"error_form = {error_form!r}: must be one of {', '.join(get_args(ErrorForm))}")
         if not (isinstance(doublings, int) and 0 <= doublings <= 64):
