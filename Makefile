@@ -12,8 +12,8 @@ test: .venv/installed-dev
 	$(BIN)/python -m pytest -n auto
 
 check: .venv/installed-dev
-	$(BIN)/ruff format --check .
-	$(BIN)/ruff check .
+	$(BIN)/ruff format --check model fmu_build tests examples
+	$(BIN)/ruff check model fmu_build tests examples
 	$(BIN)/mypy
 
 platforms: .venv/installed-dev
@@ -50,7 +50,7 @@ clean:
 	  { echo "Python >= 3.11 is needed, $(PYTHON) is older: make PYTHON=python3.12 ..." >&2; exit 1; }
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
-	$(BIN)/python -m pip install --quiet --editable '.[plot]'
+	$(BIN)/python -m pip install --quiet --editable '.[examples]'
 	mkdir -p build
 	touch $@
 

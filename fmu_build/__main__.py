@@ -4,6 +4,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from importlib.metadata import version
 from pathlib import Path
 
 from fmu_build.build import build_fmu
@@ -17,6 +18,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m fmu_build", description="Build the FMU of a scene: one line on stdout, its path."
     )
+    parser.add_argument("--version", action="version", version=version("supervessel"))
     parser.add_argument("scene", type=Path, metavar="SCENE.toml", help="the scene file")
     parser.add_argument(
         "-o", "--output", type=Path, metavar="OUT.fmu", help="the FMU to write (default: NAME.fmu here)"

@@ -11,6 +11,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import get_args
 
@@ -24,6 +25,7 @@ from supervessel.trade import TradeError, course_of, plot, study, table, write_a
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs a subcommand; returns 0 when done, 1 when it failed, each problem on stderr."""
     parser = argparse.ArgumentParser(prog="supervessel", description="Rotation of docked spacecraft.")
+    parser.add_argument("--version", action="version", version=version("supervessel"))
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     _add_import(commands.add_parser("import", help="make a scene file from Orbiter's files"))
     _add_trade(commands.add_parser("trade", help="measure what accuracy costs in a scene"))
