@@ -6,7 +6,6 @@ The C around the generated function is in function_fmu/; what no such FMU suppor
 import tempfile
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -21,15 +20,7 @@ from fmu_build.sources import LAYER
 from supervessel.problems import unknown
 
 OWN = Path(__file__).parent / "function_fmu"
-
-
-@dataclass(frozen=True)
-class Interface:
-    """Names of scalar inputs and outputs, and the inputs' start values."""
-
-    inputs: list[str]
-    outputs: list[str]
-    start: list[float]
+Interface = tuple[dict[str, float], list[str]]  # start values of scalar inputs by name, names of outputs
 
 
 def interface(function: ca.Function, starts: Mapping[str, ArrayLike]) -> Interface:
@@ -41,8 +32,8 @@ def interface(function: ca.Function, starts: Mapping[str, ArrayLike]) -> Interfa
     if function.nnz_in() + function.nnz_out() < function.numel_in() + function.numel_out():
         raise ValueError(f"{function.name()}: has sparse arguments or results; wrap it with ca.densify")
     start = [np.broadcast_to(np.ravel(starts.get(name, 0.0)), n) for name, n in sizes.items()]
-    results = {name: function.numel_out(name) for name in function.name_out()}
-    return Interface(scalars(sizes), scalars(results), np.concatenate(start).tolist())
+    inputs = dict(zip(scalars(sizes), np.concatenate(start).tolist(), strict=True))
+    return inputs, scalars({name: function.numel_out(name) for name in function.name_out()})
 
 
 def scalars(sizes: Mapping[str, int]) -> list[str]:
@@ -52,18 +43,19 @@ def scalars(sizes: Mapping[str, int]) -> list[str]:
 
 def header(function: ca.Function, known: Interface, token: str) -> str:
     """Returns function.h: what the C around the function must know of it."""
+    inputs, outputs = known
     sizes = [function.numel_in(i) for i in range(function.n_in())]
     sizes += [function.numel_out(i) for i in range(function.n_out())]
     places = 1 + np.cumsum([0, *sizes[:-1]])  # time stands before them
-    quoted = [f'"{name}"' for name in ("time", *known.inputs, *known.outputs)]
-    names, start, where = (", ".join(map(str, items)) for items in (quoted, known.start, places))
+    quoted = [f'"{name}"' for name in ("time", *inputs, *outputs)]
+    names, start, where = (", ".join(map(str, items)) for items in (quoted, inputs.values(), places))
     return f"""/* Generated: the function, its sizes, its variables by value reference. */
 #define FUNCTION {function.name()}
 #define TOKEN "{token}"
 #define NAMES {{{names}}}
 #define START {{{start}}}
 #define PLACES {{{where}}} /* of the first element of each argument and result */
-enum {{ INPUT_COUNT = {len(known.inputs)}, OUTPUT_COUNT = {len(known.outputs)} }};
+enum {{ INPUT_COUNT = {len(inputs)}, OUTPUT_COUNT = {len(outputs)} }};
 enum {{ ARGUMENT_COUNT = {function.n_in()}, RESULT_COUNT = {function.n_out()} }};
 enum {{ WORK_ARG = {function.sz_arg()}, WORK_RES = {function.sz_res()} }};
 enum {{ WORK_INT = {function.sz_iw() + 1}, WORK_REAL = {function.sz_w() + 1} }};
@@ -72,6 +64,7 @@ enum {{ WORK_INT = {function.sz_iw() + 1}, WORK_REAL = {function.sz_w() + 1} }};
 
 def description(name: str, known: Interface, token: str, fmi: int) -> bytes:
     """Returns modelDescription.xml. What an output depends on is not said: on every input."""
+    inputs, outputs = known
     key = "instantiationToken" if fmi == 3 else "guid"
     root = ET.Element("fmiModelDescription", {"fmiVersion": f"{fmi}.0", "modelName": name, key: token})
     root.set("variableNamingConvention", "structured")
@@ -81,9 +74,9 @@ def description(name: str, known: Interface, token: str, fmi: int) -> bytes:
         ET.SubElement(categories, "Category", name=category)
     variables = ET.SubElement(root, "ModelVariables")
     roles: list[dict[str, str]] = [{"causality": "independent"}]
-    roles += [{"causality": "input", "start": repr(value)} for value in known.start]
-    roles += [{"causality": "output", "initial": "calculated"}] * len(known.outputs)
-    for reference, variable in enumerate(("time", *known.inputs, *known.outputs)):
+    roles += [{"causality": "input", "start": repr(value)} for value in inputs.values()]
+    roles += [{"causality": "output", "initial": "calculated"}] * len(outputs)
+    for reference, variable in enumerate(("time", *inputs, *outputs)):
         attributes = {"name": variable, "valueReference": str(reference), "variability": "continuous"}
         attributes |= roles[reference]
         if fmi == 3:
@@ -94,7 +87,7 @@ def description(name: str, known: Interface, token: str, fmi: int) -> bytes:
     structure = ET.SubElement(root, "ModelStructure")
     for kind in ("Output", "InitialUnknown"):
         group = structure if fmi == 3 else ET.SubElement(structure, f"{kind}s")
-        for reference in range(1 + len(known.inputs), len(roles)):
+        for reference in range(1 + len(inputs), len(roles)):
             place = {"valueReference": str(reference)} if fmi == 3 else {"index": str(reference + 1)}
             ET.SubElement(group, kind if fmi == 3 else "Unknown", place)
     text: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)

@@ -14,7 +14,7 @@ from typing import Any
 import casadi as ca
 import matplotlib
 import numpy as np
-from fmpy import read_model_description, simulate_fmu
+from stepping import elements, stepped
 
 from fmu_build import build_fmu
 from supervessel import Twin, load_scene
@@ -24,6 +24,7 @@ import matplotlib.pyplot as plt
 
 Array = np.ndarray
 Control = Callable[[Array], Array]
+Masses = dict[str, float] | None
 Problem = tuple[dict[str, ca.MX], dict[str, ca.DM], list[bool], ca.Function]
 
 EXAMPLES = Path(__file__).parent
@@ -36,8 +37,7 @@ START = np.array([np.cos(np.radians(70.0)), 0.0, np.sin(np.radians(70.0)), 0.0, 
 WEIGHTS = np.array([1.0] * 3 + [4.0] * 3)  # of the error's six numbers; 10 fold at the horizon's end
 MASSES = {"as modelled": 1.0, "20 % more": 1.2, "20 % less": 0.8}  # of the FMU over the model's
 TOLERANCE, OPTIONS = 1e-3, {"print_time": False, "error_on_fail": False}
-STATE = [*(f"attitude[{i}]" for i in range(1, 5)), *(f"angular_velocity[{i}]" for i in range(1, 4))]
-TORQUES = [f"torque[{i}]" for i in range(1, 4)]
+STATE, TORQUES = [*elements("attitude", 4), *elements("angular_velocity", 3)], elements("torque", 3)
 
 
 def off_sun(x: Any) -> Any:
@@ -119,27 +119,18 @@ def controller(solver: ca.Function, bounds: dict[str, ca.DM], start: Array) -> C
 
 
 def fly(
-    fmu: Path, control: Control, start: Array, masses: float = 1.0, duration: float = DURATION
+    fmu: Path, control: Control, start: Array, masses: Masses = None, duration: float = DURATION
 ) -> tuple[Array, Array]:
     """Returns states (n, 7) and the torques (n, 3) that `control` answers them with, each 0.1 s.
 
-    masses : the vessels' over the model's
+    masses : [kg], of vessels whose mass is not the FMU's, by the names of its inputs
     """
-    variables = {v.name: v for v in read_model_description(fmu).modelVariables}
-    measured, torque = ([variables[name].valueReference for name in names] for names in (STATE, TORQUES))
     states, torques = [start], [control(start)]
-
-    def after_step(_: float, recorder: Any) -> bool:
-        states.append(np.array(recorder.fmu.getFloat64(measured)))
-        torques.append(control(states[-1]))
-        recorder.fmu.setFloat64(torque, torques[-1])
-        return True
-
     values = {name.replace("[", "_start["): value for name, value in zip(STATE, start, strict=True)}
-    values |= dict(zip(TORQUES, torques[0], strict=True))
-    values |= {name: masses * float(v.start) for name, v in variables.items() if name.endswith(".mass")}
-    times = {"stop_time": duration, "output_interval": PERIOD}
-    simulate_fmu(fmu, **times, start_values=values, step_finished=after_step)
+    with stepped(fmu, PERIOD, values | (masses or {})) as step:
+        for time in PERIOD * np.arange(round(duration / PERIOD)):
+            states.append(step(time, dict(zip(TORQUES, torques[-1], strict=True)), STATE))
+            torques.append(control(states[-1]))
     return np.array(states), np.array(torques)
 
 
@@ -153,7 +144,8 @@ def main(folder: Path) -> None:
     figure, axes = plt.subplots(3, 1, figsize=(8.0, 7.0), sharex=True, layout="constrained")
     print("| masses | to 1 deg [s] | closest to the Sun [deg] | largest rate [rad/s] | torque used [N m s] |")
     print("|---|---:|---:|---:|---:|")
-    for (label, masses), style in zip(MASSES.items(), ("-", "--", ":"), strict=True):
+    for (label, share), style in zip(MASSES.items(), ("-", "--", ":"), strict=True):
+        masses = {f"{name}.mass": share * vessel.mass for name, vessel in scene.vessels.items()}
         states, torques = fly(fmu, controller(solver, problem[1], START), START, masses)
         t, angle = PERIOD * np.arange(len(states)), np.degrees(np.arccos(off_sun(states.T)))
         errors = np.linalg.norm([np.array(twin.error(x, TARGET)).ravel()[:3] for x in states], axis=1)

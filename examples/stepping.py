@@ -1,6 +1,6 @@
 """FMUs stepped one communication step at a time through FMPy, for loops that feed something back."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from shutil import rmtree
@@ -14,8 +14,11 @@ Step = Callable[[float, dict[str, float], list[str]], np.ndarray]
 
 
 @contextmanager
-def stepped(path: Path, h: float) -> Iterator[Step]:
-    """Yields what sets inputs of an FMU at a time, steps it by h [s] and gets outputs; FMI 2 or 3."""
+def stepped(path: Path, h: float, start: Mapping[str, float] | None = None) -> Iterator[Step]:
+    """Yields what sets inputs of an FMU at a time, steps it by h [s] and gets outputs; FMI 2 or 3.
+
+    start : inputs and parameters that start otherwise than the FMU says
+    """
     description = read_model_description(str(path))
     folder = extract(str(path))
     instance = instantiate_fmu(folder, description, "CoSimulation")
@@ -26,6 +29,7 @@ def stepped(path: Path, h: float) -> Iterator[Step]:
     else:
         write, read = instance.setFloat64, instance.getFloat64
     instance.enterInitializationMode()
+    write([references[name] for name in start or {}], [*(start or {}).values()])
     instance.exitInitializationMode()
 
     def step(time: float, inputs: dict[str, float], outputs: list[str]) -> np.ndarray:

@@ -13,6 +13,7 @@ import casadi as ca
 import matplotlib
 import numpy as np
 from fmpy import simulate_fmu
+from stepping import elements
 
 from fmu_build import build_fmu
 from supervessel import Scene, Twin, parse_scene
@@ -25,7 +26,7 @@ Array = np.ndarray
 EXAMPLES = Path(__file__).parent
 SPHERE = {"name": "sphere", "root": "body", "vessels": {"body": {"mass": 1.0, "pmi": [1.0, 1.0, 1.0]}}}
 GRID, SUBSTEPS, SEEDS = 60, 40, 3
-STATE = [*(f"attitude[{i}]" for i in range(1, 5)), *(f"angular_velocity[{i}]" for i in range(1, 4))]
+STATE = [*elements("attitude", 4), *elements("angular_velocity", 3)]
 REST = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
@@ -37,13 +38,11 @@ def about_axis(twin: Twin, limit: float, axis: int) -> float:
     turn takes J e a + e x J e theta'^2, theta'^2 up to pi a.
     """
     J, e = np.array(twin.composite(twin.p_start)[2]), np.eye(3)[axis]
-    acceleration = limit / J[axis, axis]
     across = np.abs(J @ e) + np.pi * np.abs(np.cross(e, J @ e))
-    if np.delete(across, axis).max() * acceleration > limit:
-        raise ValueError(
-            f"products of inertia too large for a turn about {'xyz'[axis]}: {across.tolist()} kg m2"
-        )
-    return 2.0 * np.sqrt(np.pi / acceleration)
+    if np.delete(across, axis).max() > J[axis, axis]:
+        about = f"a turn about {'xyz'[axis]}: {across.tolist()} kg m2"
+        raise ValueError(f"products of inertia too large for {about}")
+    return 2.0 * np.sqrt(np.pi * J[axis, axis] / limit)
 
 
 def off_target(axis: int) -> list[int]:
@@ -91,11 +90,8 @@ def arcs(twin: Twin, limit: float, axis: int, time: float, torques: Array) -> tu
         h = ca.repmat(lengths[i] * time / SUBSTEPS, 1, SUBSTEPS)
         x = twin.step.fold(SUBSTEPS)(x, ca.repmat(ca.DM(torque), 1, SUBSTEPS), ca.MX(0, SUBSTEPS), h)
     miss = (x * ca.DM([1.0] * 4 + [time] * 3))[off_target(axis)]
-    options = {
-        "print_time": False,
-        "error_on_fail": True,
-        "ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-12},
-    }
+    quiet = {"print_time": False, "error_on_fail": True}
+    options = quiet | {"ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-12}}
     solver = ca.nlpsol("arcs", "ipopt", {"x": lengths, "f": ca.sum1(lengths), "g": miss}, options)
     solution = solver(x0=np.diff([0.0, *((k + 1) / GRID), 1.0]), lbx=0.0, lbg=0.0, ubg=0.0)
     return np.array(solution["x"]).ravel() * time, full
@@ -106,7 +102,7 @@ def fly(fmu: Path, lengths: Array, torques: Array) -> tuple[Array, Array]:
     ends = np.cumsum(lengths)
     times = np.append(0.0, np.repeat(ends, 2)[:-1])  # a switch twice, with the torque before and after it
     columns = [times, *np.repeat(torques, 2, axis=0).T]
-    held = np.rec.fromarrays(columns, names=["time", *(f"torque[{i}]" for i in range(1, 4))])
+    held = np.rec.fromarrays(columns, names=["time", *elements("torque", 3)])
     rest = {name.replace("[", "_start["): value for name, value in zip(STATE, REST, strict=True)}
     times = {"stop_time": ends[-1], "output_interval": ends[-1] / 200}
     flown = simulate_fmu(fmu, **times, start_values=rest, input=held, output=STATE)
@@ -120,15 +116,8 @@ def turn(scene: Scene, limit: float, axis: int, folder: Path) -> tuple:
     found = min((on_grid(twin, limit, axis, slow, seed) for seed in range(SEEDS)), key=lambda each: each[0])
     lengths, torques = arcs(twin, limit, axis, *found)
     t, states = fly(build_fmu(scene, folder / f"{scene.name}_turn.fmu"), lengths, torques)
-    target = np.insert(np.zeros(6), 1 + axis, 1.0)
-    return (
-        slow,
-        lengths,
-        torques,
-        t,
-        states,
-        np.linalg.norm(np.array(twin.error(states[-1], target)).ravel()[:3]),
-    )
+    miss = twin.error(states[-1], np.insert(np.zeros(6), 1 + axis, 1.0))[:3]
+    return slow, lengths, torques, t, states, float(ca.norm_2(miss))
 
 
 def main(folder: Path) -> None:

@@ -35,6 +35,11 @@ def build_fmu(scene: Scene, output: str | Path, fmi: int = 3, platforms: Sequenc
     fmi       : version of the FMI standard, 2 or 3
     platforms : to compile for, of `fmu_build.platforms.PLATFORMS`; none: this machine's
     Raises BuildError if the compiler fails or the file cannot be written, ValueError for another `fmi`.
+
+    Example:
+        >>> from fmu_build import build_fmu
+        >>> build_fmu(scene, "iss_dg.fmu", fmi=2).name
+        'iss_dg.fmu'
     """
     if fmi not in (2, 3):
         raise ValueError(f"fmi = {fmi}: must be 2 or 3")

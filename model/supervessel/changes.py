@@ -7,6 +7,7 @@ of ports, each keeping rate or momentum as the scene says; what docks brings its
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import reduce
 
 import casadi as ca
 import numpy as np
@@ -74,11 +75,16 @@ def change_functions(
     )
 
 
-def followed(scene: Scene, change: Change, composite: ca.Function, inputs: tuple[ca.SX, ...]) -> ca.SX:
+def followed(
+    scene: Scene, change: Change, composite: ca.Function, margins: slice, inputs: tuple[ca.SX, ...]
+) -> ca.SX:
     """Returns the angular velocity, (3,) [rad/s], after a change of inputs, in the order of this module.
 
     composite : p -> c
+    margins   : part of c, positive where its tensor is positive definite
     inputs    : angular velocity before, p before, p after, motions at contact k
+    On the way a stage may have no mass or no moment of inertia, but then nothing may change from or to it
+    that keeps the momentum, else NaN (the FMU refuses it).
     """
     omega, before, after, k = inputs
     kinds = [kind_of_change(v.group) for v in input_variables(scene) if v.part == "shape"]
@@ -87,12 +93,22 @@ def followed(scene: Scene, change: Change, composite: ca.Function, inputs: tuple
         """Returns a stage with the inputs of a kind as they are after the change."""
         return ca.vertcat(*(after[i] if kinds[i] == kind else stage[i] for i in range(len(kinds))))
 
+    def kept_over(omega: ca.SX, stage: ca.SX, following: ca.SX) -> ca.SX:
+        """Returns the angular velocity after a change that keeps the momentum."""
+        pivots = ca.vertcat(*(composite(at)[margins] for at in (stage, following)))
+        usable = reduce(ca.logic_and, ca.vertsplit(pivots > 0.0))
+        moved = reduce(ca.logic_or, ca.vertsplit(stage != following))
+        # composites are of something usable always: what is NaN here would be NaN in derivatives
+        c, d = (composite(ca.if_else(usable, at, after)) for at in (stage, following))
+        refused = ca.logic_and(ca.logic_not(usable), moved)
+        return change.keep_momentum(omega, c, d) + ca.if_else(refused, ca.SX.nan(), 0.0)
+
     flags = [i for i, kind in enumerate(kinds) if kind == "docked"]
     stage = ca.vertcat(*(before[i] * after[i] if i in flags else before[i] for i in range(len(kinds))))
     for kind, kept in scene.keeps.items():
         following = taken(stage, kind)
         if kept == "momentum":
-            omega = change.keep_momentum(omega, composite(stage), composite(following))
+            omega = kept_over(omega, stage, following)
         stage = following
     if flags:
         closing = [after[i] * (1.0 - stage[i]) for i in flags for _ in range(6)]

@@ -236,6 +236,10 @@ class Scene(Table):
     Under the convention "orbiter" the composite is that of the Orbiter simulator, for comparison: moments
     that no rigid body has are taken by the absolute values of [CV] eqs. (3-5), and of the composite's tensor
     the diagonal alone is kept.
+
+    Example:
+        >>> scene.vessels["DG"].mass
+        24500.0
     """
 
     name: Name
@@ -249,17 +253,34 @@ class Scene(Table):
     outputs: Outputs = Outputs()
 
     def port(self, name: str) -> Port:
-        """Returns the port called "vessel.port". Raises KeyError if there is none."""
+        """Returns the port called "vessel.port". Raises KeyError if there is none.
+
+        Example:
+            >>> scene.port("DG.nose").direction
+            (0.0, 0.0, -1.0)
+        """
         vessel, port = name.split(".")
         return self.vessels[vessel].ports[port]
 
     def point(self, name: str) -> Point:
-        """Returns the point called "vessel.point". Raises KeyError if there is none."""
+        """Returns the point called "vessel.point". Raises KeyError if there is none.
+
+        Example:
+            >>> scene.point("DG.thruster")
+            Traceback (most recent call last):
+            KeyError: 'thruster'
+        """
         vessel, point = name.split(".")
         return self.vessels[vessel].points[point]
 
     def dock(self, name: str) -> Dock:
-        """Returns the dock of that name. Raises KeyError if there is none."""
+        """Returns the dock of that name. Raises KeyError if there is none.
+
+        Example:
+            >>> scene.dock("berth")
+            Traceback (most recent call last):
+            KeyError: 'berth'
+        """
         for dock in self.docks:
             if dock.name == name:
                 return dock
@@ -271,6 +292,10 @@ class Scene(Table):
 
         A pose keeps momentum unless the scene says otherwise; the law "none" keeps the angular velocity
         always.
+
+        Example:
+            >>> scene.keeps
+            {'mass': 'rate', 'pose': 'momentum'}
         """
         inputs, rotation = self.inputs, self.rotation
         kinds: dict[str, Kept] = {}

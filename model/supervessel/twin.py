@@ -16,7 +16,7 @@ from supervessel.control.conventions import acados_model, do_mpc_model
 from supervessel.control.error_state import error_rate, retracted, state_error
 from supervessel.control.functions import TwinFunction
 from supervessel.control.linear import discrete_model, linear_model
-from supervessel.control.native import generate
+from supervessel.control.native import communication_step, generate
 from supervessel.control.plant import Plant
 from supervessel.equations import composite_slices
 from supervessel.inertia import from_upper_triangle
@@ -66,11 +66,11 @@ class Twin(Plant):
     h = step [s]
     e = (error of attitude [rad], of angular velocity [rad/s]) about a reference, body axes, (6,)
 
-    `composite`, `ode`, `step`, `longest_step`, `outputs` and `rollout` give the FMU's numbers; `error`,
-    `retract`, `error_ode`, `linearise`, `discretise`, `trim`, `principal`, `invariants` are for control
-    design. All have named arguments, are made when first used, and check numbers that they are called with
-    (`TwinFunction`). p, u, x, h are symbols; p_names, u_names, x_names, y_names the FMU's names; p_start and
-    x_start the scene's values.
+    `composite`, `ode`, `step`, `longest_step`, `outputs`, `rollout` and `communication_step` give the FMU's
+    numbers; `error`, `retract`, `error_ode`, `linearise`, `discretise`, `trim`, `principal`, `invariants` are
+    for control design. All have named arguments, are made when first used, and check numbers that they are
+    called with (`TwinFunction`). p, u, x, h are symbols; p_names, u_names, x_names, y_names the FMU's names;
+    p_start and x_start the scene's values.
 
     Each number of composite, ode, outputs but principal ones, and of a single sub-step of "rk4", "dop853" and
     "taylor" is the FMU's to the last bit: both evaluate the same operations in the same order, and only
@@ -308,6 +308,41 @@ class Twin(Plant):
             f.name(): f.like(c) if isinstance(f, TwinFunction) else c
             for f, c in zip(chosen, compiled, strict=True)
         }
+
+    def communication_step(self, folder: str | PathLike[str], sub_steps: int = 1) -> TwinFunction:
+        """Returns the function x, u, p, h -> x_next of a whole communication step, by the FMU's own C.
+
+        Sub-steps, control of the error and the choice that "auto" makes are the FMU's, to the last bit, as of
+        an FMU that is started at x under p. (Free motion over several steps is counted from where it began;
+        a later step then differs in the last bits.) What the FMU refuses raises RuntimeError, with the reason
+        on stderr: h <= 0, a torque for "exact", inputs that make no rigid body, too many sub-steps. It is
+        compiled already: `generate` takes nothing that calls it.
+
+        folder    : where the library goes, made if need be; what is there already is not compiled again
+        sub_steps : the derivatives, of any order, are those of so many equal steps of `step`: to rounding the
+                    value's own where the FMU takes these sub-steps, else as accurate as such steps are
+        Raises ValueError for a count below 1, BuildError if the compiler of package fmu_build fails.
+
+        Example:
+            >>> step = twin.communication_step("build/twin")
+            >>> states = step.mapaccum(5)(x=twin.x_start, u=[0, 0, 100], h=120.0)["x_next"]
+            >>> states.shape
+            (7, 5)
+        """
+        if not isinstance(sub_steps, int) or sub_steps < 1:
+            raise ValueError(f"communication_step: {sub_steps!r} sub-steps: must be a whole number from 1")
+        compiled = communication_step(self.scene, Path(folder))
+        sizes = {name: self.step.size1_in(name) for name in self.step.name_in()}
+        at = {name: ca.MX.sym(name, size) for name, size in sizes.items()}
+        columns = [ca.repmat(at[name], 1, sub_steps) for name in ("u", "p")]
+        end = self.step.fold(sub_steps)(at["x"], *columns, ca.repmat(at["h"] / sub_steps, 1, sub_steps))
+        blocks = [ca.jacobian(end, known) for known in at.values()]
+        jacobian = ca.Function(f"jac_{compiled.name()}", [*at.values(), ca.MX.sym("x_next", 7)], blocks)
+        inputs = ca.Function("inputs", [self.p], [self._inputs])(at["p"])
+        x_next = compiled(at["x"], at["u"], inputs, at["h"])
+        options: Any = {"custom_jacobian": jacobian, "enable_forward": False, "enable_reverse": False}
+        step = ca.Function(compiled.name(), [*at.values()], [x_next], [*at], ["x_next"], options)
+        return self._checked(step)
 
     def to_acados(self, step: float | None = None) -> Any:
         """Returns the plant as `acados_template.AcadosModel`: x, u, p, explicit and implicit ode.

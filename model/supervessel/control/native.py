@@ -1,13 +1,18 @@
-"""CasADi functions as C: generated, compiled and loaded back."""
+"""CasADi functions as C: generated, compiled and loaded back; and the FMU's own C as a CasADi function."""
 
 import hashlib
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import casadi as ca
 
+from supervessel.scene import Scene
+
 DERIVATIVES = (0, 1, 2)
+
+COMMUNICATION_STEP = "communication_step"
+"""The CasADi function in the C file of that name, here, which joins an FMU's C."""
 
 
 def generate(
@@ -16,29 +21,72 @@ def generate(
     """Returns functions compiled to machine code, `ca.external` each; NAME.c and the library are in folder.
 
     derivatives : of what order their derivatives are compiled too
+    What calls another library, such as `communication_step`, cannot be compiled: BuildError names that call.
     The library's name holds a digest of the source: what is there already is not compiled again, and what a
     running program has loaded is never overwritten.
     Raises BuildError if the compiler fails.
     """
-    # The compiler is the FMU's, of a package that is built on this one: looked up only here.
+    if derivatives not in DERIVATIVES:
+        raise ValueError(f"generate: derivatives = {derivatives!r}: must be 0, 1 or 2")
+    source = _source(functions, f"{name}.c", derivatives)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / f"{name}.c").write_text(source)
+    # CasADi hands 0 on for a pointer to nothing where an argument is empty.
+    flags = ("-fvisibility=default", "-Wno-int-conversion")
+    library = _compiled({f"{name}.c": source.encode()}, f"{name}.c", folder, name, flags)
+    return [ca.external(function.name(), library) for function in functions]
+
+
+def communication_step(scene: Scene, folder: Path) -> ca.Function:
+    """Returns x, u, p, h -> x_next by the C of the scene's FMU, `ca.external`; p are all of its inputs.
+
+    The library is in folder. Raises BuildError if the compiler fails.
+    """
+    # The FMU's C is of a package that is built on this one: looked up only here.
+    from fmu_build.build import generate as scene_sources  # noqa: PLC0415
+    from fmu_build.sources import source_files  # noqa: PLC0415
+
+    packed = source_files(scene_sources(scene, 3)[0], 3, scene.name)
+    # The FMI functions are one version's entry points to what the step is made of here.
+    files = {path: text for path, text in packed.items() if not path.startswith("sources/fmi")}
+    wrapper = Path(__file__).parent / f"{COMMUNICATION_STEP}.c"
+    files[f"sources/{wrapper.name}"] = wrapper.read_bytes()
+    parts = [path for path in files if path.endswith(".c") and not path.endswith(wrapper.name)]
+    whole = "".join(f'#include "{path}"\n' for path in (*parts, f"sources/{wrapper.name}"))
+    files["whole.c"] = whole.encode()
+    library = _compiled(files, "whole.c", folder, f"{scene.name}_{COMMUNICATION_STEP}")
+    return ca.external(COMMUNICATION_STEP, library)
+
+
+def _compiled(
+    files: Mapping[str, bytes], main: str, folder: Path, name: str, flags: Sequence[str] = ()
+) -> str:
+    """Returns the path of the library, NAME_digest in folder, that a C file among others makes.
+
+    files : by relative path; `main` is the one that is compiled
+    flags : beside those of FMUs
+    """
     from fmu_build.compiler import FLAGS, compile_library  # noqa: PLC0415
     from fmu_build.platforms import host_platform  # noqa: PLC0415
 
-    if derivatives not in DERIVATIVES:
-        raise ValueError(f"generate: derivatives = {derivatives!r}: must be 0, 1 or 2")
     folder.mkdir(parents=True, exist_ok=True)
     platform = host_platform()
-    source = _source(functions, f"{name}.c", derivatives)
-    (folder / f"{name}.c").write_text(source)
-    library = folder / f"{name}_{hashlib.sha256(source.encode()).hexdigest()[:16]}{platform.suffix}"
+    digest = hashlib.sha256()
+    for path, text in sorted(files.items()):
+        digest.update(f"{path} {len(text)} ".encode() + text)
+    library = folder / f"{name}_{digest.hexdigest()[:16]}{platform.suffix}"
+    if platform.suffix == ".so":  # elsewhere the linker asks by itself that every function is there
+        flags = (*flags, "-Wl,-z,defs")
     if not library.exists():
         with tempfile.TemporaryDirectory(dir=folder) as made:
+            for path, text in files.items():
+                file = Path(made, path)
+                file.parent.mkdir(exist_ok=True)
+                file.write_bytes(text)
             part = Path(made, library.name)
-            # CasADi hands 0 on for a pointer to nothing where an argument is empty.
-            flags = (*FLAGS, "-fvisibility=default", "-Wno-int-conversion")
-            compile_library([folder / f"{name}.c"], platform, part, flags)
+            compile_library([Path(made, main)], platform, part, (*FLAGS, *flags))
             part.replace(library)
-    return [ca.external(function.name(), str(library.resolve())) for function in functions]
+    return str(library.resolve())
 
 
 def _source(functions: Sequence[ca.Function], file: str, derivatives: int) -> str:

@@ -146,7 +146,8 @@ class Plant:
     def step(self) -> TwinFunction:
         """x, u, p, h -> x_next, attitude at unit length, by one step of the scene's propagator.
 
-        Of "auto" by the method that it takes with torque.
+        Of "auto" by the method that it takes with torque. Where a problem's first attitude is of unit length,
+        |q| = 1 is no constraint to add: it would depend on the others.
 
         Example:
             >>> states = twin.step.mapaccum(50)(x=twin.x_start, u=[0, 0, 100], h=0.1)["x_next"]
@@ -177,6 +178,8 @@ class Plant:
 
         What undocks leaves with its share; masses, then poses change and keep rate or momentum as the scene
         says; what docks brings its momentum along, moving as the inputs of motion at contact in p_next say.
+        NaN where what is joined has no moment of inertia when masses or poses change and keep the momentum,
+        which the FMU refuses.
 
         Example:
             >>> moved = twin.p_with({"DG.nose.position": [5.0, -0.49, -10.076]})
@@ -190,7 +193,8 @@ class Plant:
         if model.change is not None:
             inputs = (omega, self._inputs[:shaping], after[:shaping], after[shaping:])
             with simplification(False):
-                omega = followed(self.scene, model.change, model.composite, inputs)
+                margins = composite_slices()["margins"]
+                omega = followed(self.scene, model.change, model.composite, margins, inputs)
         x_next = ca.vertcat(self.x[:4], omega)
         return self._function("change", {"x": self.x, "p": self.p, "p_next": p_next}, {"x_next": x_next})
 

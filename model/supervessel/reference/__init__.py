@@ -2,6 +2,8 @@
 
 Everything takes and returns plain arrays in SI units; `values` overrides inputs by the names that the FMU
 gives them. The body axes are those of the root vessel.
+
+In the examples `scene` is `load_scene("examples/iss_dg.toml")`, with `from supervessel import reference`.
 """
 
 from supervessel.reference.assembly import (

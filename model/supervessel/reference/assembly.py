@@ -22,6 +22,10 @@ class Motion:
     origin   : (3,) [m], of the vessel's axes
     rate     : (3,) [rad/s], angular velocity relative to the root
     velocity : (3,) [m/s], of the origin relative to the root
+
+    Example:
+        >>> reference.motions(scene)["ISS"].rate.tolist()
+        [0.0, 0.0, 0.0]
     """
 
     rotation: Array
@@ -30,14 +34,25 @@ class Motion:
     velocity: Array
 
     def carry(self, positions_vessel: Array) -> tuple[Array, Array]:
-        """Returns positions [m] and velocities [m/s], root axes, of points of the vessel, (3,) or (n, 3)."""
+        """Returns positions [m] and velocities [m/s], root axes, of points of the vessel, (3,) or (n, 3).
+
+        Example:
+            >>> positions, velocities = reference.motions(scene)["DG"].carry(np.zeros(3))
+            >>> positions.round(3).tolist()
+            [0.09, -27.976, 3.31]
+        """
         arms = positions_vessel @ self.rotation.T
         return self.origin + arms, self.velocity + _cross(self.rate, arms)
 
 
 @dataclass(frozen=True)
 class Points:
-    """Point masses: masses (n,) [kg], positions (n, 3) [m], velocities (n, 3) [m/s], root vessel's axes."""
+    """Point masses: masses (n,) [kg], positions (n, 3) [m], velocities (n, 3) [m/s], root vessel's axes.
+
+    Example:
+        >>> reference.points(scene)["DG"].positions.shape
+        (6, 3)
+    """
 
     masses: Array
     positions: Array
@@ -45,14 +60,24 @@ class Points:
 
     @property
     def barycentre(self) -> Array:
-        """Their barycentre, (3,) [m]."""
+        """Their barycentre, (3,) [m].
+
+        Example:
+            >>> reference.points(scene)["DG"].barycentre.round(3).tolist()
+            [0.09, -27.976, 3.31]
+        """
         m, r = self.masses, self.positions
         barycentre: Array = r[0] + m @ (r - r[0]) / m.sum()
         return barycentre
 
     @property
     def momentum(self) -> Array:
-        """Their angular momentum about their barycentre, (3,) [N m s]."""
+        """Their angular momentum about their barycentre, (3,) [N m s].
+
+        Example:
+            >>> reference.points(scene)["DG"].momentum.tolist()
+            [0.0, 0.0, 0.0]
+        """
         m, v = self.masses, self.velocities
         v_rho = v - m @ v / m.sum()
         momentum: Array = m @ _cross(self.positions - self.barycentre, v_rho)
@@ -66,6 +91,10 @@ class Composite:
     mass       : [kg]
     barycentre : (3,) [m], root vessel's axes, from its origin
     inertia    : (3, 3) [kg m2], about the barycentre, root vessel's axes
+
+    Example:
+        >>> round(reference.composite(scene).mass, 3)
+        479500.0
     """
 
     mass: float
@@ -74,7 +103,12 @@ class Composite:
 
     @property
     def pmi(self) -> Array:
-        """Mass-normalised moments, (3,) [m2]: the diagonal of the inertia tensor over mass."""
+        """Mass-normalised moments, (3,) [m2]: the diagonal of the inertia tensor over mass.
+
+        Example:
+            >>> reference.composite(scene).pmi.round(1).tolist()
+            [404.6, 683.2, 521.1]
+        """
         return np.diag(self.inertia) / self.mass
 
 
@@ -85,6 +119,10 @@ def sample_points(pmi: ArrayLike, convention: str = "rigid_body") -> Array:
     A square that is negative within rounding (a rod or a plate on the triangle's edge) counts as zero; by the
     convention "orbiter" the absolute value of any square is taken.
     Source: [CV] eqs. (3-7), (12).
+
+    Example:
+        >>> reference.sample_points([1.0, 1.0, 1.0])[0].round(6).tolist()
+        [1.224745, 0.0, 0.0]
     """
     k1, k2, k3 = np.asarray(pmi, dtype=float)
     squares = 1.5 * np.array([k2 + k3 - k1, k3 + k1 - k2, k1 + k2 - k3])
@@ -98,6 +136,10 @@ def port_axes(direction: ArrayLike, alignment: ArrayLike) -> Array:
     direction : (3,), kept but for its length
     alignment : (3,), projected onto the plane across direction
     Both of any length > 0, not parallel (not checked).
+
+    Example:
+        >>> reference.port_axes([0, 0, 2], [0.5, 0, 3])[:, 1].tolist()
+        [1.0, 0.0, 0.0]
     """
     d = np.asarray(direction, dtype=float)
     a = np.asarray(alignment, dtype=float)
@@ -119,6 +161,10 @@ def closed_docks(scene: Scene, values: Mapping[str, float] | None = None) -> lis
     """Returns the docks that are closed: for ever, or as their inputs say.
 
     Raises ValueError if two of them share a port, or if they join two vessels that are joined already.
+
+    Example:
+        >>> [dock.ports for dock in reference.closed_docks(scene)]
+        [('ISS.P2', 'DG.nose')]
     """
     closed: list[Dock] = []
     occupied: set[str] = set()
@@ -146,6 +192,10 @@ def motions(scene: Scene, values: Mapping[str, float] | None = None) -> dict[str
     Ports are mated face to face with their alignments together: R d_B = -d_A, R a_B = a_A. A port that moves
     takes its mate along.
     Source: [CV] eqs. (8), (9).
+
+    Example:
+        >>> list(reference.motions(scene))
+        ['ISS', 'DG']
     """
     at_rest = np.zeros(3)
     placed = {scene.root: Motion(np.eye(3), at_rest, at_rest, at_rest)}
@@ -167,7 +217,13 @@ def motions(scene: Scene, values: Mapping[str, float] | None = None) -> dict[str
 
 
 def poses(scene: Scene, values: Mapping[str, float] | None = None) -> dict[str, tuple[Array, Array]]:
-    """Returns R_root_vessel, (3, 3), and origin, (3,) [m], root axes, of each vessel joined to the root."""
+    """Returns R_root_vessel, (3, 3), and origin, (3,) [m], root axes, of each vessel joined to the root.
+
+    Example:
+        >>> R_root_vessel, origin = reference.poses(scene)["DG"]
+        >>> origin.round(3).tolist()
+        [0.09, -27.976, 3.31]
+    """
     return {vessel: (motion.rotation, motion.origin) for vessel, motion in motions(scene, values).items()}
 
 
@@ -219,6 +275,10 @@ def points(scene: Scene, values: Mapping[str, float] | None = None) -> dict[str,
     """Returns the six points of each vessel joined to the root, the root's first.
 
     A vessel given by a full tensor has its points on its own principal axes.
+
+    Example:
+        >>> {name: part.positions.shape for name, part in reference.points(scene).items()}
+        {'ISS': (6, 3), 'DG': (6, 3)}
     """
     found = {}
     for name, motion in motions(scene, values).items():
@@ -235,7 +295,12 @@ def points(scene: Scene, values: Mapping[str, float] | None = None) -> dict[str,
 
 
 def joined(parts: Iterable[Points]) -> Points:
-    """Returns the points of several vessels as one set."""
+    """Returns the points of several vessels as one set.
+
+    Example:
+        >>> reference.joined(reference.points(scene).values()).masses.shape
+        (12,)
+    """
     lists = [(part.masses, part.positions, part.velocities) for part in parts]
     masses, positions, velocities = (np.concatenate(arrays) for arrays in zip(*lists, strict=True))
     return Points(masses, positions, velocities)
@@ -247,6 +312,10 @@ def composite(scene: Scene, values: Mapping[str, float] | None = None) -> Compos
     values : inputs by the FMU's names that differ from the scene's, `{"DG.mass": 12000.0}`
     Source: [CV] eqs. (10), (11), with the products of inertia that the note leaves out; by the convention
     "orbiter" without.
+
+    Example:
+        >>> round(reference.composite(scene, {"DG.mass": 12000.0}).mass, 3)
+        467000.0
     """
     whole = joined(points(scene, values).values())
     m, rho = whole.masses, whole.positions - whole.barycentre
@@ -261,5 +330,9 @@ def internal_momentum(scene: Scene, values: Mapping[str, float] | None = None) -
     """Returns the angular momentum of parts that move relative to the root, (3,) [N m s].
 
     About the barycentre, root vessel's axes, which count as at rest: h = sum m rho x rho'.
+
+    Example:
+        >>> reference.internal_momentum(scene).tolist()
+        [0.0, 0.0, 0.0]
     """
     return joined(points(scene, values).values()).momentum

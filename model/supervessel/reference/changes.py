@@ -22,6 +22,11 @@ def change(
     In this order: vessels leave, with the motion they have; masses and moments change; poses and the motion
     of ports change; vessels arrive. The law "none" keeps the angular velocity.
     Raises ValueError if docks close that cannot, see `closed_docks`.
+
+    Example:
+        >>> rate = reference.change(scene, [0.0, 0.0011, 0.0], {}, {"DG.nose.position[1]": 5.0})
+        >>> bool(rate[1] < 0.0011)  # the ship is farther out: the same momentum, a lower rate
+        True
     """
     omega = np.array(angular_velocity, dtype=float)
     if scene.rotation.law == "none":
@@ -83,6 +88,11 @@ def at_contact(
     moves as a rigid body: with the root, and by the dock's velocity and rate beside that. These are the
     motion of the dock's second port relative to its first at their common point, in the axes of the first
     port's vessel; where the first port's vessel is the one that arrives, it moves oppositely.
+
+    Example:
+        >>> parts = reference.at_contact(scene, [0.0, 0.0, 0.01], {}, {})
+        >>> bool(abs(reference.joined(parts.values()).momentum[2]) > 1e6)
+        True
     """
     placed, own = motions(scene, after), points(scene, after)
     omega = np.asarray(angular_velocity, dtype=float)

@@ -18,7 +18,12 @@ from supervessel.scene import ORIGIN, VESSEL_OUTPUT_NAMES, Scene
 
 
 def rotation_matrix(attitude: ArrayLike) -> Array:
-    """Returns R_inertial_body, (3, 3), of the unit quaternion `attitude`, (4,), scalar first."""
+    """Returns R_inertial_body, (3, 3), of the unit quaternion `attitude`, (4,), scalar first.
+
+    Example:
+        >>> (reference.rotation_matrix([0, 0, 0, 1]) @ [1, 2, 3]).tolist()
+        [-1.0, -2.0, 3.0]
+    """
     w, x, y, z = np.asarray(attitude, dtype=float)
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     rotation: Array = np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
@@ -30,6 +35,10 @@ def attitude_dot(attitude: ArrayLike, angular_velocity: ArrayLike) -> Array:
 
     attitude         : (4,), unit, scalar first, body to inertial
     angular_velocity : (3,) [rad/s], body axes
+
+    Example:
+        >>> reference.attitude_dot([1, 0, 0, 0], [0.2, 0, 0]).tolist()
+        [0.0, 0.1, 0.0, 0.0]
     """
     q, omega = np.asarray(attitude, dtype=float), np.asarray(angular_velocity, dtype=float)
     return 0.5 * np.concatenate([[-q[1:] @ omega], q[0] * omega + np.cross(q[1:], omega)])
@@ -40,6 +49,11 @@ def quaternion(rotation: ArrayLike) -> Array:
 
     The inverse of `rotation_matrix`: w, x, y, z times each other are linear in the matrix's elements, and the
     quaternion is the axis that the matrix of these products has.
+
+    Example:
+        >>> quarter_turn = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]  # about the third axis
+        >>> reference.quaternion(quarter_turn)[[0, 3]].round(6).tolist()
+        [0.707107, 0.707107]
     """
     R = np.asarray(rotation, dtype=float)
     twist = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
@@ -51,7 +65,12 @@ def quaternion(rotation: ArrayLike) -> Array:
 
 
 def law_tensor(law: str, inertia: ArrayLike) -> Array:
-    """Returns the part of an inertia tensor that a rotation law uses, (3, 3): all of it or its diagonal."""
+    """Returns the part of an inertia tensor that a rotation law uses, (3, 3): all of it or its diagonal.
+
+    Example:
+        >>> reference.law_tensor("principal", [[2, 1, 0], [1, 3, 0], [0, 0, 4]]).tolist()
+        [[2.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 4.0]]
+    """
     J = np.asarray(inertia, dtype=float)
     return np.diag(np.diag(J)) if law in ("principal", "decoupled") else J
 
@@ -72,6 +91,10 @@ def angular_acceleration(
     internal_momentum : (3,) [N m s], about the barycentre, body axes, of parts that move at steady rates
     Source: [CV] eq. (1) for "tensor", eq. (2) for "principal"; "decoupled" leaves out the gyroscopic
     term, "none" keeps the angular velocity.
+
+    Example:
+        >>> reference.angular_acceleration("tensor", np.diag([1, 2, 4]), [1, 2, 0.5], [0, 0, 0]).tolist()
+        [-2.0, 0.75, -0.5]
     """
     J = law_tensor(law, inertia)
     omega, torque = np.asarray(angular_velocity, dtype=float), np.asarray(torque, dtype=float)
@@ -90,6 +113,10 @@ def external_torque(scene: Scene, values: Mapping[str, float] | None = None) -> 
     """Returns the torque on what is joined to the root, (3,) [N m], about its barycentre, body axes.
 
     The torque input, the moments of forces at their points, and torques on vessels.
+
+    Example:
+        >>> reference.external_torque(scene, {"torque[3]": 100.0}).tolist()
+        [0.0, 0.0, 100.0]
     """
     torque, barycentre = vector("torque", ORIGIN, values), composite(scene, values).barycentre
     for vessel, motion in motions(scene, values).items():
@@ -102,7 +129,12 @@ def external_torque(scene: Scene, values: Mapping[str, float] | None = None) -> 
 
 
 def net_force(scene: Scene, values: Mapping[str, float] | None = None) -> Array:
-    """Returns the sum of the forces on what is joined to the root, (3,) [N], body axes."""
+    """Returns the sum of the forces on what is joined to the root, (3,) [N], body axes.
+
+    Example:
+        >>> reference.net_force(scene).tolist()
+        [0.0, 0.0, 0.0]
+    """
     force = np.zeros(3)
     for vessel, motion in motions(scene, values).items():
         for point in scene.vessels[vessel].points:
@@ -120,6 +152,10 @@ def ode(
 
     torque : (3,) [N m], all that acts from outside, about the barycentre; by default what `values` say
     Inputs are steady: between changes.
+
+    Example:
+        >>> reference.ode(scene, [1, 0, 0, 0, 0, 0.002, 0])[:4].tolist()
+        [0.0, 0.0, 0.001, 0.0]
     """
     state = np.asarray(state, dtype=float)
     acceleration = angular_acceleration(
@@ -138,6 +174,10 @@ def angular_momentum(
     """Returns H = J omega + h, (3,) [N m s], about the barycentre, body axes, J being the law's tensor.
 
     angular_velocity : (3,) [rad/s], body axes
+
+    Example:
+        >>> round(float(reference.angular_momentum(scene, [0, 0.0011, 0])[1]) / 1e3)  # kN m s
+        360
     """
     J = law_tensor(scene.rotation.law, composite(scene, values).inertia)
     momentum: Array = J @ np.asarray(angular_velocity, dtype=float) + internal_momentum(scene, values)
@@ -145,7 +185,13 @@ def angular_momentum(
 
 
 def angular_velocity(scene: Scene, momentum: ArrayLike, values: Mapping[str, float] | None = None) -> Array:
-    """Returns omega = J^-1 (H - h), (3,) [rad/s], body axes, of a momentum H, (3,) [N m s], body axes."""
+    """Returns omega = J^-1 (H - h), (3,) [rad/s], body axes, of a momentum H, (3,) [N m s], body axes.
+
+    Example:
+        >>> momentum = reference.angular_momentum(scene, [0, 0.0011, 0])
+        >>> round(float(reference.angular_velocity(scene, momentum)[1]), 9)
+        0.0011
+    """
     J = law_tensor(scene.rotation.law, composite(scene, values).inertia)
     excess: Array = np.asarray(momentum, dtype=float) - internal_momentum(scene, values)
     return np.asarray(np.linalg.solve(J, excess), dtype=float)
@@ -155,6 +201,11 @@ def momentum_ode(scene: Scene, state: ArrayLike, values: Mapping[str, float] | N
     """Returns the rate of the state (attitude, angular momentum in body axes), (7,), under the scene's law.
 
     H' = M - omega x H; without the gyroscopic term under "decoupled". Right however the inputs move.
+
+    Example:
+        >>> rate = reference.momentum_ode(scene, [1, 0, 0, 0, 0, 0, 0], {"torque[3]": 10.0})
+        >>> rate[4:].tolist()
+        [0.0, 0.0, 10.0]
     """
     state = np.asarray(state, dtype=float)
     omega = angular_velocity(scene, state[4:], values)
@@ -170,6 +221,11 @@ def vessel_outputs(
     """Returns the outputs of each vessel, "vessel.output"; all zero for one that is not joined to the root.
 
     state : (attitude, angular velocity), (7,)
+
+    Example:
+        >>> outputs = reference.vessel_outputs(scene, [1, 0, 0, 0, 0, 0.0011, 0])
+        >>> outputs["DG.origin"].round(2).tolist()
+        [0.09, -26.55, 3.14]
     """
     state = np.asarray(state, dtype=float)
     omega, R_inertial_body = state[4:], rotation_matrix(state[:4])
