@@ -77,9 +77,9 @@ class Twin(Plant):
     + - * / and the square root occur, which IEEE 754 rounds correctly everywhere. Taylor steps, free motion
     and principal axes agree to a few u (1 + angle turned).
 
-    Directions in p may have any length whose square a double holds. Nothing in p is checked but that it is
-    finite: the FMU refuses a negative mass or parallel port axes, the twin is a formula that an optimiser may
-    take there.
+    Directions in p may have any length whose square a double holds. Of p as a whole nothing is checked but
+    that it is finite: the FMU refuses a negative mass, parallel port axes, two ships at one port; the twin is
+    a formula that an optimiser may take there. `p_with` refuses what an input can never have.
 
     scene      : from `load_scene`
     propagator : "rk4" and so on, instead of the scene's

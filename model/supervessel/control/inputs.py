@@ -29,8 +29,22 @@ def placed_values(values: Mapping[str, ArrayLike], names: Sequence[str]) -> dict
         if len(given) != len(places) or not np.isfinite(given).all():
             count = "a finite number" if len(places) == 1 else f"{len(places)} finite numbers"
             raise ValueError(f"{name} = {value!r}: must be {count}")
+        problem = _problem(name.rpartition(".")[2].partition("[")[0], given.tolist())
+        if problem:
+            raise ValueError(f"{name} = {value!r}: {problem}")
         placed |= dict(zip(places, given.tolist(), strict=True))
     return placed
+
+
+def _problem(kind: str, given: Sequence[float]) -> str:
+    """Returns why an input cannot have these values whatever the others are, or "" if it may."""
+    if kind in ("mass", "pmi") and min(given) < 0.0:
+        return "must not be negative"
+    if kind == "docked" and given[0] not in (0.0, 1.0):
+        return "must be 0 or 1"
+    if kind in ("direction", "alignment") and len(given) == 3 and not any(given):
+        return "must be longer than 0"
+    return ""
 
 
 def places_of(name: str, names: Sequence[str]) -> list[int]:

@@ -88,7 +88,8 @@ class Plant:
         """Returns the scene's p, (n,), with some values changed.
 
         values : by the names of p, or three at once by a name without index
-        Raises ValueError for names that are none, sizes that do not fit, numbers that are not finite.
+        Raises ValueError for names that are none, sizes that do not fit, values that an
+        input can never have. What makes no sense together the FMU alone judges.
 
         Example:
             >>> twin.p_with({"DG.mass": 12000.0})[0]
