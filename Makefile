@@ -29,6 +29,8 @@ stability: .venv/installed-dev
 bench: .venv/installed-dev
 	$(BIN)/python tests/bench/run.py
 	PYTHONPATH=tests $(BIN)/python tests/bench/costs.py
+	PYTHONPATH=tests $(BIN)/python tests/bench/vessels.py
+	PYTHONPATH=tests $(BIN)/python tests/bench/precision.py
 	$(BIN)/python tests/bench/propagators.py
 	$(BIN)/python tests/bench/twin.py
 	mkdir -p build
@@ -41,6 +43,8 @@ slews: .venv/installed-dev
 
 peers: .venv-peers/installed
 	PYTHONPATH=tests .venv-peers/bin/python tests/peers/peers.py
+	PYTHONPATH=tests:tests/bench .venv-peers/bin/python tests/peers/work.py
+	PYTHONPATH=tests:tests/bench .venv-peers/bin/python tests/peers/composites.py
 
 clean:
 	rm -rf .venv .venv-peers build .pytest_cache .mypy_cache .ruff_cache .hypothesis
@@ -62,6 +66,6 @@ clean:
 	$(PYTHON) -m venv .venv-peers
 	.venv-peers/bin/python -m pip install --quiet --upgrade 'pip>=25.1'
 	.venv-peers/bin/python -m pip install --quiet --editable . scipy mpmath
-	@for p in mujoco drake bsk; do .venv-peers/bin/python -m pip install --quiet $$p || \
+	@for p in mujoco drake bsk pin pythonfmu; do .venv-peers/bin/python -m pip install --quiet $$p || \
 	  echo "$$p cannot be installed here: skipped"; done
 	touch $@

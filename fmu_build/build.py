@@ -3,6 +3,7 @@
 import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from fmu_build.changes import change_tables
@@ -10,7 +11,7 @@ from fmu_build.codegen import digest, model_source, scene_header, scene_source
 from fmu_build.compiler import compile_binaries, compiler_cache
 from fmu_build.documentation import documentation
 from fmu_build.errors import BuildError
-from fmu_build.loop import loop_functions, loop_source, loop_tables
+from fmu_build.loop import loop_functions, loop_source, loop_steps, loop_tables
 from fmu_build.model_description import model_description
 from fmu_build.platforms import Platform, host_platform
 from fmu_build.reference_result import reference_result
@@ -22,6 +23,10 @@ from supervessel.scene import Scene
 
 ARCHIVE_TIME = (1980, 1, 1, 0, 0, 0)
 """Every file in an archive carries the same time, so that a scene gives the same bytes each time."""
+
+TOKEN_IN_C = 'MODEL_TOKEN[] = "{}"'
+TOKEN_IN_XML = {2: 'guid="{}"', 3: 'instantiationToken="{}"'}
+"""Where the token stands that is made of everything else."""
 
 WHOLE = "whole.c"
 """All of an FMU's C in one translation unit, so that the compiler inlines across files."""
@@ -50,13 +55,11 @@ def build_fmu(scene: Scene, output: str | Path, fmi: int = 3, platforms: Sequenc
     entries = variable_table(scene, model)
     sources, description = _generated(scene, model, entries, fmi)
     packed = source_files(sources, fmi, scene.name)
-    binaries = compile_sources(packed, source_file_names(sources, fmi), fmi, platforms, scene.name)
-    content = {
-        "modelDescription.xml": description,
-        **packed,
-        **binaries,
-        **companions(scene, model, entries, fmi),
-    }
+    with ThreadPoolExecutor(1) as aside:  # the compiler is a process of its own
+        names = source_file_names(sources, fmi)
+        binaries = aside.submit(compile_sources, packed, names, fmi, platforms, scene.name)
+        beside = companions(scene, model, entries, fmi)
+    content = {"modelDescription.xml": description, **packed, **binaries.result(), **beside}
     _write_archive(content, output)
     return output
 
@@ -79,12 +82,15 @@ def _generated(
         "model.c": model_source(functions),
         "scene.h": scene_header(scene, model, entries, functions, loop),
         "scene.c": scene_source(entries, "", changing) + tables,
+        "lane_kernels.h": loop_steps(scene, loop),
     }
     names = source_file_names(sources, fmi)
     without_token = model_description(scene, entries, "", fmi, names)
     token = digest(*source_files(sources, fmi, scene.name).values(), without_token)
-    sources["scene.c"] = scene_source(entries, token, changing) + tables
-    return sources, model_description(scene, entries, token, fmi, names)
+    sources["scene.c"] = sources["scene.c"].replace(TOKEN_IN_C.format(""), TOKEN_IN_C.format(token))
+    attribute = TOKEN_IN_XML[fmi]
+    with_token = attribute.format(token).encode()
+    return sources, without_token.replace(attribute.format("").encode(), with_token, 1)
 
 
 def companions(scene: Scene, model: Equations, entries: Sequence[Entry], fmi: int) -> dict[str, bytes]:

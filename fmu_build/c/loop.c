@@ -1,3 +1,4 @@
+#include <stdbool.h>
 #include <string.h>
 
 #include "model.h"
@@ -5,22 +6,22 @@
 
 #if LOOP
 
+#include "lane_kernels.h"
+
 enum { POSE = 12, PORT = 9, SEEN = 9, MOST_ARGUMENTS = 10 };
 
 /* Values, or small changes of or weights on them: everything between p and c. */
 typedef struct {
-    double pose[LOOP_FRAME_COUNT][POSE], seen[LOOP_BODY_COUNT][SEEN];
+    double pose[LOOP_FRAME_COUNT][POSE], seen[LOOP_BODY_COUNT][SEEN], mass[LOOP_BODY_COUNT];
     double sum[4], middle[3], inertia[6];
 } Chain;
 
 /* Sums are read and written in one place: each element of theirs follows from the same element before. */
 typedef int Kernel(const double **arg, double **res, int *iw, double *w, int mem);
 
-static Kernel *const SEE[] = {loop_fixed, loop_scaled, loop_free,
-        loop_own_fixed, loop_own_scaled, loop_own_free};
-static Kernel *const SEE_FORWARD[] = {loop_fixed_forward, loop_scaled_forward, loop_free_forward,
+static Kernel *const SEE_FORWARD[] = {loop_fixed_forward, loop_scaled_forward, loop_free_forward, loop_diagonal_forward,
         loop_own_fixed_forward, loop_own_scaled_forward, loop_own_free_forward};
-static Kernel *const SEE_REVERSE[] = {loop_fixed_reverse, loop_scaled_reverse, loop_free_reverse,
+static Kernel *const SEE_REVERSE[] = {loop_fixed_reverse, loop_scaled_reverse, loop_free_reverse, loop_diagonal_reverse,
         loop_own_fixed_reverse, loop_own_scaled_reverse, loop_own_free_reverse};
 
 static const double NOTHING[POSE];
@@ -42,44 +43,192 @@ static void add_weights(double wp[], int index, const double terms[], size_t cou
     if (index >= 0) add_to(&wp[index], terms, count);
 }
 
-static void place_frames(const double p[], Chain *now, double *w) {
+/* Places frames in axes that stand already, all in the same way.
+   step : poses in those of the vessels that they hang on
+   to   : where their poses go */
+static void hang(const double p[], const Chain *now, const LoopFrame *const f[LANES], const Lanes step[POSE],
+                 double *const to[LANES]) {
+    const double *outer[LANES], *inside[LANES];
+    Lanes pose[POSE], held[POSE], turned[POSE], placed[POSE];
+    for (size_t k = 0; k < LANES; k++) {
+        outer[k] = now->pose[f[k]->parent];
+        inside[k] = value(p, f[k]->inside);
+    }
+    if (f[0]->kind == FRAME_INSIDE) {
+        lanes_gather(held, inside, POSE);
+        lanes_then((const Lanes *const[]){held, step}, turned);
+        step = turned;
+    }
+    lanes_gather(pose, outer, POSE);
+    lanes_then((const Lanes *const[]){pose, step}, placed);
+    lanes_scatter(to, placed, POSE);
+}
+
+static void hang_one(const double p[], Chain *now, size_t frame, const Lanes steps[POSE], size_t lane) {
+    const LoopFrame *f[LANES];
+    double *to[LANES];
+    Lanes step[POSE];
+    for (size_t k = 0; k < LANES; k++) {
+        f[k] = &LOOP_FRAMES[frame];
+        to[k] = now->pose[frame];
+    }
+    for (size_t i = 0; i < POSE; i++) step[i] = lanes_all(lane_of(steps[i], lane));
+    hang(p, now, f, step, to);
+}
+
+static void place_frames(const double p[], Chain *now) {
     memset(now->pose[0], 0, sizeof now->pose[0]);
     for (size_t i = 0; i < 9; i += 4) now->pose[0][i] = 1.0;
-    for (size_t i = 1; i < LOOP_FRAME_COUNT; i++) {
-        const LoopFrame *f = &LOOP_FRAMES[i];
-        double *res[] = {now->pose[i]};
-        if (f->kind == FRAME_INSIDE) {
-            const double *arg[] = {now->pose[f->parent], value(p, f->inside), value(p, f->parent_port),
-                                   value(p, f->child_port)};
-            loop_hang_inside(arg, res, NULL, w, 0);
+    for (size_t i = 1; i < LOOP_FRAME_COUNT; i += LANES) {
+        const size_t count = i + LANES <= LOOP_FRAME_COUNT ? LANES : 1;
+        const LoopFrame *f[LANES];
+        const double *parent_port[LANES], *child_port[LANES];
+        double *to[LANES];
+        Lanes parent[PORT], child[PORT], step[POSE];
+        bool together = true;
+        for (size_t k = 0; k < LANES; k++) {
+            const size_t frame = k < count ? i + k : i;
+            f[k] = &LOOP_FRAMES[frame];
+            to[k] = now->pose[frame];
+            parent_port[k] = value(p, f[k]->parent_port);
+            child_port[k] = value(p, f[k]->child_port);
+            together = together && (size_t)f[k]->parent < i && f[k]->kind == f[0]->kind;
+        }
+        lanes_gather(parent, parent_port, PORT);
+        lanes_gather(child, child_port, PORT);
+        lanes_mated((const Lanes *const[]){parent, child}, step);
+        if (together) {
+            hang(p, now, f, step, to);
         } else {
-            const double *arg[] = {now->pose[f->parent], value(p, f->parent_port), value(p, f->child_port)};
-            loop_hang(arg, res, NULL, w, 0);
+            for (size_t k = 0; k < count; k++) hang_one(p, now, i + k, step, k);
         }
     }
 }
 
+static void take_poses(Lanes to[POSE], const Chain *now, const LoopBody *const b[LANES]) {
+    const double *from[LANES];
+    for (size_t k = 0; k < LANES; k++) from[k] = now->pose[b[k]->frame];
+    lanes_gather(to, from, POSE);
+}
+
+static void take_held(Lanes to[], const double p[], const LoopBody *const b[LANES], size_t count) {
+    const double *from[LANES];
+    for (size_t k = 0; k < LANES; k++) from[k] = value(p, b[k]->held);
+    lanes_gather(to, from, count);
+}
+
+static void take_moments(Lanes to[3], const double p[], const LoopBody *const b[LANES]) {
+    const double *from[LANES];
+    for (size_t k = 0; k < LANES; k++) from[k] = value(p, b[k]->moments);
+    lanes_gather(to, from, 3);
+}
+
+/* Sees bodies of one kind from the root's axes. */
+static void see(const double p[], const Chain *now, const LoopBody *const b[LANES], const Lanes *mass, Lanes seen[SEEN]) {
+    Lanes pose[POSE], held[POSE], moments[3];
+    const Lanes *const arg[] = {pose, mass, held, moments};
+    switch (b[0]->kind) {
+        case BODY_FIXED:
+            take_poses(pose, now, b);
+            take_held(held, p, b, SEEN);
+            lanes_fixed(arg, seen);
+            break;
+        case BODY_SCALED:
+            take_poses(pose, now, b);
+            take_held(held, p, b, SEEN);
+            lanes_scaled(arg, seen);
+            break;
+        case BODY_FREE:
+            take_poses(pose, now, b);
+            take_held(held, p, b, POSE);
+            take_moments(moments, p, b);
+            lanes_free(arg, seen);
+            break;
+        case BODY_DIAGONAL:
+            take_poses(pose, now, b);
+            take_moments(moments, p, b);
+            lanes_diagonal(arg, seen);
+            break;
+        case BODY_OWN_FIXED:
+            take_held(held, p, b, SEEN);
+            lanes_own_fixed(arg, seen);
+            break;
+        case BODY_OWN_SCALED:
+            take_held(held, p, b, SEEN);
+            lanes_own_scaled(arg, seen);
+            break;
+        case BODY_OWN_FREE:
+        default:
+            take_held(held, p, b, POSE);
+            take_moments(moments, p, b);
+            lanes_own_free(arg, seen);
+            break;
+    }
+}
+
+/* Takes as many bodies as there are lanes: the tables have as many of a kind together. */
+static void take_bodies(const LoopBody *b[LANES], size_t first) {
+    for (size_t k = 0; k < LANES; k++) b[k] = &LOOP_BODIES[first + k];
+}
+
+static Lanes masses_of(const double p[], const LoopBody *const b[LANES]) {
+    double mass[LANES];
+    for (size_t k = 0; k < LANES; k++) mass[k] = *value(p, b[k]->mass);
+    return lanes_of(mass);
+}
+
+/* Sums masses and first moments about the first body's centre. */
+static void sum_masses(const double p[], Chain *now) {
+    double sum[4] = {0.0, 0.0, 0.0, 0.0};
+    Lanes first[3];
+    for (size_t j = 0; j < LOOP_BODY_COUNT; j += LANES) {
+        const LoopBody *b[LANES];
+        take_bodies(b, j);
+        const Lanes mass = masses_of(p, b);
+        Lanes seen[SEEN], lever[3];
+        double *to[LANES];
+        see(p, now, b, &mass, seen);
+        for (size_t k = 0; k < LANES; k++) to[k] = now->seen[j + k];
+        lanes_scatter(to, seen, SEEN);
+        memcpy(&now->mass[j], &mass, sizeof mass);
+        for (size_t i = 0; i < 3 && j == 0; i++) first[i] = lanes_all(lane_of(seen[i], 0));
+        lanes_lever((const Lanes *const[]){&mass, seen, first}, lever);
+        for (size_t k = 0; k < LANES; k++) {
+            sum[0] += lane_of(mass, k);
+            for (size_t i = 0; i < 3; i++) sum[i + 1] += lane_of(lever[i], k);
+        }
+    }
+    memcpy(now->sum, sum, sizeof sum);
+}
+
+/* Sums inertia about the common centre. */
+static void sum_inertia(Chain *now) {
+    double inertia[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    Lanes first[3], middle[3];
+    for (size_t i = 0; i < 3; i++) {
+        first[i] = lanes_all(now->seen[0][i]);
+        middle[i] = lanes_all(now->middle[i]);
+    }
+    for (size_t j = 0; j < LOOP_BODY_COUNT; j += LANES) {
+        const Lanes mass = lanes_of(&now->mass[j]);
+        const double *seen[LANES];
+        Lanes centre[3], own[6];
+        for (size_t k = 0; k < LANES; k++) seen[k] = now->seen[j + k];
+        lanes_gather(centre, seen, 3);
+        lanes_spread((const Lanes *const[]){&mass, centre, first, middle}, own);
+        for (size_t k = 0; k < LANES; k++)
+            for (size_t i = 0; i < 6; i++) inertia[i] = inertia[i] + seen[k][i + 3] + lane_of(own[i], k);
+    }
+    memcpy(now->inertia, inertia, sizeof inertia);
+}
+
 static void put_together(const double p[], Chain *now, double *w) {
-    place_frames(p, now, w);
-    memset(now->sum, 0, sizeof now->sum);
-    memset(now->inertia, 0, sizeof now->inertia);
-    for (size_t j = 0; j < LOOP_BODY_COUNT; j++) {
-        const LoopBody *b = &LOOP_BODIES[j];
-        const double *arg[] = {now->pose[b->frame], value(p, b->mass), value(p, b->held), value(p, b->moments)};
-        double *res[] = {now->seen[j]};
-        SEE[b->kind](arg, res, NULL, w, 0);
-        const double *weighed[] = {now->sum, value(p, b->mass), now->seen[j], now->seen[0]};
-        res[0] = now->sum;
-        loop_weigh(weighed, res, NULL, w, 0);
-    }
+    place_frames(p, now);
+    sum_masses(p, now);
     const double *sum[] = {now->sum};
-    double *middle_of[] = {now->middle};
-    loop_middle(sum, middle_of, NULL, w, 0);
-    for (size_t j = 0; j < LOOP_BODY_COUNT; j++) {
-        const double *arg[] = {now->inertia, value(p, LOOP_BODIES[j].mass), now->seen[j], now->seen[0], now->middle};
-        double *res[] = {now->inertia};
-        loop_add(arg, res, NULL, w, 0);
-    }
+    double *middle[] = {now->middle};
+    loop_middle(sum, middle, NULL, w, 0);
+    sum_inertia(now);
 }
 
 /* w: two chains, then what the kernels need. */

@@ -16,7 +16,7 @@ typedef struct {
 
 /* A body of a group: several constant vessels, or one whose mass or moments are inputs; OWN: of the root's group. */
 typedef struct {
-    enum { BODY_FIXED, BODY_SCALED, BODY_FREE, BODY_OWN_FIXED, BODY_OWN_SCALED, BODY_OWN_FREE } kind;
+    enum { BODY_FIXED, BODY_SCALED, BODY_FREE, BODY_DIAGONAL, BODY_OWN_FIXED, BODY_OWN_SCALED, BODY_OWN_FREE } kind;
     int frame, mass, held, moments;
 } LoopBody;
 

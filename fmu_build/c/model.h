@@ -37,37 +37,29 @@ int free_double(const double **arg, double **res, int *iw, double *w, int mem); 
 int free_finish(const double **arg, double **res, int *iw, double *w, int mem);       /* x, a, t, v, k -> x */
 
 /* Of these a scene has those whose composite is a loop; see supervessel/kernels.py. */
-int loop_hang(const double **arg, double **res, int *iw, double *w, int mem);         /* pose, port, port -> pose */
 int loop_hang_forward(const double **arg, double **res, int *iw, double *w, int mem);
 int loop_hang_reverse(const double **arg, double **res, int *iw, double *w, int mem);
-int loop_hang_inside(const double **arg, double **res, int *iw, double *w, int mem);  /* pose, pose, port, port -> pose */
 int loop_hang_inside_forward(const double **arg, double **res, int *iw, double *w, int mem);
 int loop_hang_inside_reverse(const double **arg, double **res, int *iw, double *w, int mem);
-int loop_fixed(const double **arg, double **res, int *iw, double *w, int mem);        /* pose, mass, held, moments -> seen */
 int loop_fixed_forward(const double **arg, double **res, int *iw, double *w, int mem);
 int loop_fixed_reverse(const double **arg, double **res, int *iw, double *w, int mem);
-int loop_scaled(const double **arg, double **res, int *iw, double *w, int mem);       /* the same */
 int loop_scaled_forward(const double **arg, double **res, int *iw, double *w, int mem);
 int loop_scaled_reverse(const double **arg, double **res, int *iw, double *w, int mem);
-int loop_free(const double **arg, double **res, int *iw, double *w, int mem);         /* the same */
 int loop_free_forward(const double **arg, double **res, int *iw, double *w, int mem);
 int loop_free_reverse(const double **arg, double **res, int *iw, double *w, int mem);
-int loop_own_fixed(const double **arg, double **res, int *iw, double *w, int mem);    /* the same */
+int loop_diagonal_forward(const double **arg, double **res, int *iw, double *w, int mem);
+int loop_diagonal_reverse(const double **arg, double **res, int *iw, double *w, int mem);
 int loop_own_fixed_forward(const double **arg, double **res, int *iw, double *w, int mem);
 int loop_own_fixed_reverse(const double **arg, double **res, int *iw, double *w, int mem);
-int loop_own_scaled(const double **arg, double **res, int *iw, double *w, int mem);   /* the same */
 int loop_own_scaled_forward(const double **arg, double **res, int *iw, double *w, int mem);
 int loop_own_scaled_reverse(const double **arg, double **res, int *iw, double *w, int mem);
-int loop_own_free(const double **arg, double **res, int *iw, double *w, int mem);     /* the same */
 int loop_own_free_forward(const double **arg, double **res, int *iw, double *w, int mem);
 int loop_own_free_reverse(const double **arg, double **res, int *iw, double *w, int mem);
-int loop_weigh(const double **arg, double **res, int *iw, double *w, int mem);        /* sum, mass, seen, first -> sum */
 int loop_weigh_forward(const double **arg, double **res, int *iw, double *w, int mem);
 int loop_weigh_reverse(const double **arg, double **res, int *iw, double *w, int mem);
 int loop_middle(const double **arg, double **res, int *iw, double *w, int mem);       /* sum -> middle */
 int loop_middle_forward(const double **arg, double **res, int *iw, double *w, int mem);
 int loop_middle_reverse(const double **arg, double **res, int *iw, double *w, int mem);
-int loop_add(const double **arg, double **res, int *iw, double *w, int mem);          /* inertia, mass, seen, first, middle -> inertia */
 int loop_add_forward(const double **arg, double **res, int *iw, double *w, int mem);
 int loop_add_reverse(const double **arg, double **res, int *iw, double *w, int mem);
 int loop_finish(const double **arg, double **res, int *iw, double *w, int mem);       /* sum, first, middle, inertia -> c */

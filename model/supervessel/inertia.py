@@ -11,6 +11,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from supervessel.inlining import inlined
+
 UPPER_TRIANGLE = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Where xx, yy, zz, xy, xz, yz stand in a tensor."""
 
@@ -65,12 +67,6 @@ def placed_body(mass: ca.SX, specific_inertia: ca.SX, centre: ca.SX, rotation: c
     return Body(mass, origin + rotation @ centre, mass * specific)
 
 
-def congruence(rotation: ca.SX, inertia: ca.SX) -> ca.SX:
-    """Returns R J R^T, (3, 3), exactly symmetric, for a symmetric J."""
-    half = rotation @ inertia
-    return symmetric(lambda i, j: ca.dot(half[i, :], rotation[j, :]))
-
-
 def symmetric(element: Callable[[int, int], ca.SX]) -> ca.SX:
     """Returns the symmetric (3, 3) matrix whose upper triangle is `element(i, j)`, i <= j."""
     matrix = ca.SX(3, 3)
@@ -78,6 +74,13 @@ def symmetric(element: Callable[[int, int], ca.SX]) -> ca.SX:
         for j in range(i, 3):
             matrix[i, j] = matrix[j, i] = element(i, j)
     return ca.densify(matrix)
+
+
+@inlined((3, 3), (3, 3))
+def congruence(rotation: ca.SX, inertia: ca.SX) -> ca.SX:
+    """Returns R J R^T, (3, 3), exactly symmetric, for a symmetric J."""
+    half = rotation @ inertia
+    return symmetric(lambda i, j: ca.dot(half[i, :], rotation[j, :]))
 
 
 def orbiter_moments(pmi: ca.SX) -> ca.SX:
@@ -148,11 +151,6 @@ def combine_numbers(
     return float(mass), centres[:, 0] + centre, inertia
 
 
-def offset_tensor(d: ca.SX) -> ca.SX:
-    """Returns |d|^2 E - d d^T, (3, 3)."""
-    return symmetric(lambda i, j: _offset_square(d, i, j))
-
-
 def _offset_square(d: Any, i: int, j: int) -> Any:
     """Returns element (i, j) of |d|^2 E - d d^T without subtracting squares.
 
@@ -162,6 +160,12 @@ def _offset_square(d: Any, i: int, j: int) -> Any:
         return -d[i] * d[j]
     one, other = (k for k in range(3) if k != i)
     return d[one] * d[one] + d[other] * d[other]
+
+
+@inlined((3,))
+def offset_tensor(d: ca.SX) -> ca.SX:
+    """Returns |d|^2 E - d d^T, (3, 3)."""
+    return symmetric(lambda i, j: _offset_square(d, i, j))
 
 
 def ldl(inertia: ca.SX) -> tuple[ca.SX, ca.SX]:

@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from supervessel.inlining import inlined
 from supervessel.quantities import Vector
 
 
@@ -41,6 +42,7 @@ class Pose:
         return Pose(self.rotation.T, -(self.rotation.T @ self.origin))
 
 
+@inlined((3,), (3,))
 def port_axes(direction: ca.SX, alignment: ca.SX) -> ca.SX:
     """Returns the orthonormal columns (d, a, d x a), (3, 3), of a port, vessel axes.
 

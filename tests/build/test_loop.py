@@ -9,7 +9,7 @@ import pytest
 
 from fmu_build.build import generate
 from fmu_build.compiler import FLAGS, compile_library
-from fmu_build.loop import LONGEST_CODE, loop_tables
+from fmu_build.loop import LANES, LONGEST_CODE, loop_tables
 from fmu_build.platforms import host_platform
 from fmu_build.sources import source_files
 from supervessel import Scene, Twin, parse_scene
@@ -52,10 +52,11 @@ SCENES = {
 class Compiled:
     """Functions of a scene's generated C, loaded."""
 
-    def __init__(self, scene: Scene, folder: Path) -> None:
+    def __init__(self, scene: Scene, folder: Path, lanes: int = LANES) -> None:
         self.name = scene.name
         for path, text in source_files(generate(scene, 3)[0], 3, scene.name).items():
-            (folder / Path(path).name).write_bytes(text)
+            for_lanes = text.replace(f"LOOP_LANES {LANES}".encode(), f"LOOP_LANES {lanes}".encode())
+            (folder / Path(path).name).write_bytes(for_lanes)
         self.work = int(_constant((folder / "scene.h").read_text(), "WORK_REAL"))
         library = folder / f"scene{host_platform().suffix}"
         sources = [Path(name) for name in ("loop.c", "model.c", "scene.c")]
@@ -95,6 +96,18 @@ def test_the_loop_gives_the_bits_of_the_straight_code(both):
     compiled, model, p = both
     truth = np.array(model.composite(p)).ravel()
     np.testing.assert_array_equal(compiled("composite", p, size=len(truth)), truth)
+
+
+def test_one_vessel_at_a_time_gives_the_same_bits(tmp_path):
+    """As compilers without registers of several numbers take them."""
+    scene = parse_scene(every_kind())
+    p, count = p_start(scene), equations(scene).composite.numel_out(0)
+    found = []
+    for lanes in (1, LANES):
+        folder = tmp_path / str(lanes)
+        folder.mkdir()
+        found.append(Compiled(scene, folder, lanes)("composite", p, size=count))
+    np.testing.assert_array_equal(*found)
 
 
 def test_forward_derivatives_of_the_loop_are_those_of_the_straight_code(both):

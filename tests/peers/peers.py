@@ -30,13 +30,16 @@ NAMES = {
     "mujoco": "MuJoCo",
     "drake": "Drake",
     "bsk": "Basilisk",
+    "pin": "Pinocchio",
+    "casadi": "CasADi",
+    "pythonfmu": "pythonfmu",
 }
 
 
 def main(packages: list[str]) -> None:
     """Prints the table, a row for each task."""
     chosen = [(i, s) for i, s in enumerate(SETTINGS) if not packages or s.package in packages]
-    versions = {package: _version(package) for package in dict.fromkeys(s.package for _, s in chosen)}
+    versions = {package: version(package) for package in dict.fromkeys(s.package for _, s in chosen)}
     for package in [p for p, version in versions.items() if version is None]:
         print(f"{NAMES[package]} is not installed: left out\n")
     chosen = [(i, s) for i, s in chosen if versions[s.package]]
@@ -73,7 +76,8 @@ def _title(setting: Setting) -> str:
     return f"{NAMES[setting.package]} {setting.label}"
 
 
-def _version(package: str) -> str | None:
+def version(package: str) -> str | None:
+    """Returns the version of a package; None where it is not installed."""
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:

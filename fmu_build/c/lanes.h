@@ -1,0 +1,78 @@
+/* The same arithmetic on several numbers at once, where the compiler knows a way; every lane has the bits of plain
+   doubles. The loop's steps for several vessels (lane_kernels.h) are generated in terms of it. */
+#ifndef LANES_H
+#define LANES_H
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "scene.h"
+
+#ifdef __GNUC__
+enum { LANES = LOOP_LANES };
+typedef double Lanes __attribute__((vector_size(LOOP_LANES * sizeof(double))));
+#else
+enum { LANES = 1 };
+typedef double Lanes;
+#endif
+
+#ifndef __has_builtin
+#define __has_builtin(x) 0
+#endif
+
+static inline Lanes lanes_of(const double lane[LANES]) {
+    Lanes made;
+    memcpy(&made, lane, sizeof made);
+    return made;
+}
+
+static inline double lane_of(Lanes x, size_t k) {
+    double lane[LANES];
+    memcpy(lane, &x, sizeof lane);
+    return lane[k];
+}
+
+static inline Lanes lanes_all(double value) {
+    double lane[LANES];
+    for (size_t k = 0; k < LANES; k++) lane[k] = value;
+    return lanes_of(lane);
+}
+
+static inline Lanes lanes_sqrt(Lanes x) {
+#if __has_builtin(__builtin_elementwise_sqrt)
+    return __builtin_elementwise_sqrt(x);
+#else
+    double lane[LANES];
+    memcpy(lane, &x, sizeof lane);
+    for (size_t k = 0; k < LANES; k++) lane[k] = sqrt(lane[k]);
+    return lanes_of(lane);
+#endif
+}
+
+static inline Lanes lanes_fabs(Lanes x) {
+    double lane[LANES];
+    memcpy(lane, &x, sizeof lane);
+    for (size_t k = 0; k < LANES; k++) lane[k] = fabs(lane[k]);
+    return lanes_of(lane);
+}
+
+/* Takes `count` numbers from as many places as there are lanes. */
+static inline void lanes_gather(Lanes to[], const double *const from[LANES], size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        double lane[LANES];
+        for (size_t k = 0; k < LANES; k++) lane[k] = from[k][i];
+        to[i] = lanes_of(lane);
+    }
+}
+
+/* Puts them back. Where places are the same, so must the lanes be. */
+static inline void lanes_scatter(double *const to[LANES], const Lanes from[], size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        double lane[LANES];
+        memcpy(lane, &from[i], sizeof lane);
+        for (size_t k = 0; k < LANES; k++) to[k][i] = lane[k];
+    }
+}
+
+#endif
