@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: run test check platforms robustness stability bench slews peers clean
+.PHONY: run test check platforms robustness stability accuracy bench slews peers clean
 
 run: .venv/installed
 	$(BIN)/python -m fmu_build examples/iss_dg.toml -o build/iss_dg.fmu
@@ -25,6 +25,9 @@ robustness: .venv/installed-dev
 stability: .venv/installed-dev
 	$(BIN)/python -m pytest -m stability tests/stability
 	cd tests && ../$(BIN)/python -m stability.table
+
+accuracy: .venv/installed-dev
+	$(BIN)/python -m pytest -m accuracy tests/accuracy
 
 bench: .venv/installed-dev
 	$(BIN)/python tests/bench/run.py

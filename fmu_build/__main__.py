@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import shutil
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -10,13 +11,17 @@ from pathlib import Path
 from fmu_build.build import build_fmu
 from fmu_build.errors import BuildError
 from fmu_build.platforms import PLATFORMS, platforms_named
-from supervessel import SceneError, load_scene
+from supervessel import Scene, SceneError, choose, load_scene
+from supervessel.accuracy import said
+from supervessel.trade import TradeError
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Builds the FMU of a scene file; returns 0 when done, 1 when it failed, each problem on stderr."""
     parser = argparse.ArgumentParser(
-        prog="python -m fmu_build", description="Build the FMU of a scene: one line on stdout, its path."
+        prog="python -m fmu_build",
+        description="Build the FMU of a scene: its path on stdout, before it in "
+        "a line what [accuracy] has chosen.",
     )
     parser.add_argument("--version", action="version", version=version("supervessel"))
     parser.add_argument("scene", type=Path, metavar="SCENE.toml", help="the scene file")
@@ -42,20 +47,37 @@ def main(arguments: Sequence[str] | None = None) -> int:
         output = options.output or Path(f"{scene.name}.fmu")
         if output.resolve() == options.scene.resolve():
             raise BuildError(f"{output}: is the scene file itself; the FMU needs a name of its own")
+        chosen = _choose(scene) if scene.accuracy else []
         build_fmu(scene, output, options.fmi, platforms)
     except (SceneError, BuildError) as error:
         print(error, file=sys.stderr)
         return 1
+    except TradeError as error:
+        print(f"{options.scene.name}: {error}", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         print("interrupted; no FMU was written", file=sys.stderr)
         return 1
-    return _print_path(output)
+    return _print([*chosen, str(output)])
 
 
-def _print_path(output: Path) -> int:
-    """Prints the path of the FMU; returns 0, or 1 where standard output does not take it."""
+def _choose(scene: Scene) -> list[str]:
+    """Returns what `[accuracy]` chooses, in a line; shows on a terminal how far that is."""
+    width = shutil.get_terminal_size().columns - 1
+
+    def show(what: str) -> None:
+        if sys.stderr.isatty():
+            print(f"\r{f'accuracy: {what}'[:width]:<{width}}", end="", file=sys.stderr, flush=True)
+
+    _, evidence = choose(scene, show)
+    show("")
+    return [said(evidence)]
+
+
+def _print(lines: Sequence[str]) -> int:
+    """Prints results, the FMU's path last; returns 0, or 1 where standard output does not take them."""
     try:
-        print(output, flush=True)
+        print("\n".join(lines), flush=True)
     except (OSError, UnicodeError) as error:
         print(f"the FMU is built, its path cannot be printed: {error}", file=sys.stderr)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left is flushed at the end

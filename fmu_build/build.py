@@ -1,14 +1,16 @@
 """From a scene to a packed FMU."""
 
+import json
 import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 from fmu_build.changes import change_tables
 from fmu_build.codegen import digest, model_source, scene_header, scene_source
-from fmu_build.compiler import compile_binaries, compiler_cache
+from fmu_build.compiler import FLAGS, compile_binaries, compiler_cache
 from fmu_build.documentation import documentation
 from fmu_build.errors import BuildError
 from fmu_build.loop import loop_functions, loop_source, loop_steps, loop_tables
@@ -18,8 +20,10 @@ from fmu_build.reference_result import reference_result
 from fmu_build.sources import source_file_names, source_files
 from fmu_build.table import Entry, variable_table
 from fmu_build.terminals import terminals_and_icons
+from supervessel.accuracy import choose
 from supervessel.equations import Equations, equations
 from supervessel.scene import Scene
+from supervessel.trade import TradeError
 
 ARCHIVE_TIME = (1980, 1, 1, 0, 0, 0)
 """Every file in an archive carries the same time, so that a scene gives the same bytes each time."""
@@ -39,7 +43,9 @@ def build_fmu(scene: Scene, output: str | Path, fmi: int = 3, platforms: Sequenc
     output    : the file to write; its folder must be there. An old one is replaced once the new is whole.
     fmi       : version of the FMI standard, 2 or 3
     platforms : to compile for, of `fmu_build.platforms.PLATFORMS`; none: this machine's
-    Raises BuildError if the compiler fails or the file cannot be written, ValueError for another `fmi`.
+    A scene with `[accuracy]` is built as `supervessel.choose` finds it; the evidence is in the archive.
+    Raises BuildError if the compiler fails, the file cannot be written, or nothing is as exact as the scene
+    asks, ValueError for another `fmi`.
 
     Example:
         >>> from fmu_build import build_fmu
@@ -51,6 +57,7 @@ def build_fmu(scene: Scene, output: str | Path, fmi: int = 3, platforms: Sequenc
     output = Path(output)
     _check_output(output)
     platforms = platforms or (host_platform(),)
+    scene, evidence = _chosen(scene)
     model = equations(scene)
     entries = variable_table(scene, model)
     sources, description = _generated(scene, model, entries, fmi)
@@ -58,15 +65,28 @@ def build_fmu(scene: Scene, output: str | Path, fmi: int = 3, platforms: Sequenc
     with ThreadPoolExecutor(1) as aside:  # the compiler is a process of its own
         names = source_file_names(sources, fmi)
         binaries = aside.submit(compile_sources, packed, names, fmi, platforms, scene.name)
-        beside = companions(scene, model, entries, fmi)
+        beside = companions(scene, model, entries, fmi, evidence)
     content = {"modelDescription.xml": description, **packed, **binaries.result(), **beside}
     _write_archive(content, output)
     return output
 
 
-def generate(scene: Scene, fmi: int) -> tuple[dict[str, str], bytes]:
-    """Returns what is particular to a scene: its C files by name, and modelDescription.xml."""
-    model = equations(scene)
+def _chosen(scene: Scene) -> tuple[Scene, dict[str, Any] | None]:
+    """Returns a scene with its law, and by what evidence that was chosen, if it was."""
+    if scene.accuracy is None:
+        return scene, None
+    try:
+        return choose(scene)
+    except TradeError as error:
+        raise BuildError(f"{scene.name}: {error}") from None
+
+
+def generate(scene: Scene, fmi: int, model: Equations | None = None) -> tuple[dict[str, str], bytes]:
+    """Returns what is particular to a scene: its C files by name, and modelDescription.xml.
+
+    model : the scene's equations, if they are there already
+    """
+    model = model or equations(scene)
     return _generated(scene, model, variable_table(scene, model), fmi)
 
 
@@ -93,33 +113,46 @@ def _generated(
     return sources, without_token.replace(attribute.format("").encode(), with_token, 1)
 
 
-def companions(scene: Scene, model: Equations, entries: Sequence[Entry], fmi: int) -> dict[str, bytes]:
-    """Returns documentation, icons, terminals and reference result by their paths in the archive."""
+def companions(
+    scene: Scene,
+    model: Equations,
+    entries: Sequence[Entry],
+    fmi: int,
+    evidence: Mapping[str, Any] | None = None,
+) -> dict[str, bytes]:
+    """Returns documentation, icons, terminals and reference result by their paths in the archive.
+
+    evidence : of `supervessel.choose`, for a scene with `[accuracy]`
+    """
+    shown = {} if evidence is None else {"resources/accuracy.json": json.dumps(evidence, indent=1).encode()}
     return {
-        **documentation(scene, entries, fmi),
+        **documentation(scene, entries, fmi, evidence),
+        **shown,
         "terminalsAndIcons/terminalsAndIcons.xml": terminals_and_icons(scene, entries, fmi),
         **reference_result(scene, model),
     }
 
 
-def compile_sources(
+def compile_sources(  # noqa: PLR0913, PLR0917
     packed: Mapping[str, bytes],
     names: Sequence[str],
     fmi: int,
     platforms: Sequence[Platform],
     identifier: str,
+    flags: Sequence[str] = FLAGS,
 ) -> dict[str, bytes]:
     """Returns an FMU's libraries by archive path, compiled from its own sources/.
 
     packed     : the files of sources/ by archive path
     names      : of the C files among them
     identifier : the FMU's modelIdentifier
+    flags      : of the compiler
     Raises BuildError if the compiler fails, or if there is no room for what it makes.
     """
     whole = "".join(f'#include "sources/{name}"\n' for name in names)
     try:
         folder = _kept({**packed, WHOLE: whole.encode()})
-        return compile_binaries([WHOLE], folder, platforms, fmi, identifier)
+        return compile_binaries([WHOLE], folder, platforms, fmi, identifier, flags)
     except OSError as error:
         raise BuildError(f"{error.filename}: no room to compile in: {error.strerror}") from None
 

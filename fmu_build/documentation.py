@@ -1,6 +1,7 @@
 """What an FMU holds beside its library and descriptions: documentation, licences, icons."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from fmu_build.drawing import drawing, icon
 from fmu_build.figure import svg
@@ -13,11 +14,14 @@ from fmu_build.terminals import terminal_icons
 from supervessel.scene import Scene
 
 
-def documentation(scene: Scene, entries: Sequence[Entry], fmi: int) -> dict[str, bytes]:
+def documentation(
+    scene: Scene, entries: Sequence[Entry], fmi: int, evidence: Mapping[str, Any] | None = None
+) -> dict[str, bytes]:
     """Returns the files by their place in the archive; the same scene gives the same bytes.
 
-    entries : the variable table
-    fmi     : version of the FMI standard, 2 or 3. FMI 2.0 has its icon in model.png; from 2.0.4 on it knows
+    entries  : the variable table
+    evidence : of the choice of law and propagator, where the scene has `[accuracy]`
+    fmi      : version of the FMI standard, 2 or 3. FMI 2.0 has its icon in model.png; from 2.0.4 on it knows
               the folder terminalsAndIcons too.
     The icons that terminalsAndIcons.xml names are among the files, the XML file itself is not.
     Raises BuildError if an installed package does not have its licence text where it should be.
@@ -26,7 +30,9 @@ def documentation(scene: Scene, entries: Sequence[Entry], fmi: int) -> dict[str,
     diagram, symbol = drawing(parts), icon(parts)
     symbol_png = png(symbol)
     files = {
-        "documentation/index.html": page(parts, entries, fmi, svg(diagram, standalone=False)).encode(),
+        "documentation/index.html": page(
+            parts, entries, fmi, svg(diagram, standalone=False), evidence
+        ).encode(),
         "documentation/diagram.svg": svg(diagram).encode(),
         "documentation/diagram.png": png(diagram),
         "terminalsAndIcons/icon.svg": svg(symbol).encode(),

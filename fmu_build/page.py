@@ -3,12 +3,13 @@
 One file of HTML without scripts or links to elsewhere, written so that an XML parser reads it too.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib.metadata import version
 from math import floor, log10
 from pathlib import Path
 from string import Template
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -101,13 +102,20 @@ STATUS = {
 }
 
 
-def page(parts: Assembly, entries: Sequence[Entry], fmi: int, picture: str) -> str:
+def page(
+    parts: Assembly,
+    entries: Sequence[Entry],
+    fmi: int,
+    picture: str,
+    evidence: Mapping[str, Any] | None = None,
+) -> str:
     """Returns the HTML text that documents an FMU.
 
-    parts   : the scene, placed
-    entries : the variable table
-    fmi     : version of the FMI standard, 2 or 3
-    picture : the drawing, an svg element
+    parts    : the scene, placed
+    entries  : the variable table
+    fmi      : version of the FMI standard, 2 or 3
+    picture  : the drawing, an svg element
+    evidence : of the choice of law and propagator, where the scene has `[accuracy]`
     """
     scene = parts.scene
     rotation = scene.rotation
@@ -129,8 +137,67 @@ def page(parts: Assembly, entries: Sequence[Entry], fmi: int, picture: str) -> s
         law_text=law_text,
         propagator=escape(rotation.propagator),
         propagator_text=description(scene),
+        accuracy="" if evidence is None else _accuracy(evidence),
         definite="" if rotation.law == "none" else " and positive definite",
         status=STATUS[fmi],
+    )
+
+
+def _accuracy(evidence: Mapping[str, Any]) -> str:
+    """Returns what was asked of the accuracy, what was flown, and what came of each candidate, HTML."""
+    asked = evidence["asked"]
+    rows: list[tuple[Cell, ...]] = [
+        ("largest error of the attitude asked [rad]", asked["attitude"]),
+        ("of the rate [rad/s]", "any" if asked["rate"] is None else asked["rate"]),
+        ("up to [s]", asked["horizon"]),
+        ("in communication steps of [s]", asked["step"]),
+        ("margin that flights keep", evidence["margin"]),
+        ("chosen", _settings(evidence["choice"])),
+        ("its largest error in flight [rad], [rad/s]", (evidence["attitude"], evidence["rate"])),
+        ("the exact motion is known to [rad], [rad/s]", tuple(evidence["doubt"].values())),
+        ("by two ways", "; ".join(evidence["truth"])),
+        ("flights", f"{len(evidence['histories'])}: {'; '.join(evidence['histories'])}"),
+        ("steps of each, of which looked at", (evidence["steps"], evidence["looked_at"])),
+        ("inputs drawn, of which senseless", (evidence["rows_drawn"], evidence["rows_senseless"])),
+    ]
+    found: list[tuple[Cell, ...]] = [
+        (
+            _settings(one),
+            one["operations"],
+            *(("", "") if one["refused"] else (one["attitude"], one["rate"])),
+            f"refused: {one['refused']}" if one["refused"] else one["worst"],
+            one["flights"],
+            "yes" if one["enough"] else "no",
+        )
+        for one in evidence["candidates"]
+    ]
+    found += [
+        (_settings(one), one["operations"], "", "", "at least; dearer than the choice, not flown", 0, "")
+        for one in evidence["dearer"]
+    ]
+    head = (
+        "candidate",
+        "operations per step",
+        "attitude [rad]",
+        "rate [rad/s]",
+        "worst in",
+        "flights",
+        "enough",
+    )
+    excluded = "".join(f"<li>{escape(what)};</li>\n" for what in evidence["not_covered"])
+    return (
+        f"<h3>Accuracy</h3>\n<p>{escape(evidence['claim'])} Law and propagator are the cheapest, by counted "
+        "operations, whose flights keep the accuracy with the margin.</p>\n"
+        f"{_table('', (), rows)}<p>Not covered:</p>\n<ul>\n{excluded}</ul>\n"
+        + _table("Candidates: largest errors in flight", head, found)
+    )
+
+
+def _settings(choice: Mapping[str, Any]) -> str:
+    """Returns the keys of [rotation] of a choice as text."""
+    values = [choice["law"], choice["propagator"]]
+    return ", ".join(
+        [*values, *(f"{key} {choice[key]:g}" for key in ("tolerance", "max_angle_step") if key in choice)]
     )
 
 

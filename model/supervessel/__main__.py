@@ -18,7 +18,7 @@ from typing import get_args
 from supervessel.loading import load_scene, parse_scene
 from supervessel.orbiter import ScenarioError, import_scenario
 from supervessel.problems import SceneError
-from supervessel.scene import Convention, Scene
+from supervessel.scene import Convention, Scene, without_accuracy
 from supervessel.trade import TradeError, course_of, plot, study, table, write_all
 
 
@@ -113,7 +113,7 @@ def _trade(options: argparse.Namespace) -> int:
     from fmu_build.errors import BuildError  # noqa: PLC0415
 
     try:
-        scene = _lasting(load_scene(options.scene), options.duration)
+        scene = _lasting(without_accuracy(load_scene(options.scene)), options.duration)
         folder: Path = options.output or Path(f"{scene.name}_trade")
         course_of(scene)
         write_all(folder, {})

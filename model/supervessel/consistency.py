@@ -10,7 +10,17 @@ from typing import Any
 
 from supervessel.problems import quantity
 from supervessel.quantities import Vector, is_number, triangle_problem, vector_length
-from supervessel.scene import PARALLEL_LIMIT, PERPENDICULAR_LIMIT, VARIABLE_UNITS, tables
+from supervessel.scene import (
+    CHOSEN,
+    MOST_STEPS,
+    PARALLEL_LIMIT,
+    PERPENDICULAR_LIMIT,
+    VARIABLE_UNITS,
+    input_groups,
+    tables,
+)
+
+HALF_ULP = 2.0**-53
 
 
 def consistency_problems(raw: Mapping[str, Any]) -> list[str]:
@@ -22,7 +32,8 @@ def consistency_problems(raw: Mapping[str, Any]) -> list[str]:
         problems += _rigid_moments(f"vessels.{name}", vessel) if rigid else _no_tensor(name, vessel)
         for port, table in tables(vessel, "ports"):
             problems += direction_problems(f"vessels.{name}.ports.{port}", table)
-    return [*problems, *_experiment(raw), *_ranges(raw), *_total_mass(raw), *_propagator(raw), *_changes(raw)]
+    problems += [*_experiment(raw), *_accuracy(raw), *_ranges(raw), *_total_mass(raw)]
+    return [*problems, *_propagator(raw), *_changes(raw)]
 
 
 def _moments(place: str, vessel: Mapping[str, Any]) -> Iterator[str]:
@@ -86,6 +97,43 @@ def _experiment(raw: Mapping[str, Any]) -> Iterator[str]:
         duration, step = _number(experiment, "duration"), _number(experiment, "step")
         if step > duration > 0.0:
             yield f"experiment.step = {step} s: must not exceed duration = {duration} s"
+
+
+def _accuracy(raw: Mapping[str, Any]) -> Iterator[str]:
+    """Yields why [accuracy] leaves nothing to choose, or asks for what cannot be."""
+    accuracy, rotation, inputs = (raw.get(key, {}) for key in ("accuracy", "rotation", "inputs"))
+    if "accuracy" not in raw or not isinstance(accuracy, Mapping):
+        return
+    horizon, step, rate = (_number(accuracy, key) for key in ("horizon", "step", "rate"))
+    if step > horizon > 0.0:
+        yield f"accuracy.step = {step} s: must not exceed horizon = {horizon} s"
+    elif step > 0.0 and horizon > MOST_STEPS * step:
+        count = f"accuracy.horizon = {horizon} s: in steps of {step} s that are {horizon / step:.6g} steps"
+        yield f"{count}; at most {MOST_STEPS}"
+    if isinstance(rotation, Mapping):
+        for key in CHOSEN:
+            if key in rotation:
+                yield f"rotation.{key}: given beside [accuracy], which chooses it; leave it out"
+        spin = _vector(rotation, "angular_velocity")
+        if spin is not None and 0.0 < rate < HALF_ULP * vector_length(spin):
+            least = f"{HALF_ULP * vector_length(spin):.3g} rad/s, what doubles tell of this angular_velocity"
+            yield f"accuracy.rate = {rate} rad/s: must be at least {least}"
+    without = list(_without_range(inputs)) if isinstance(inputs, Mapping) else []
+    if without:
+        names = ", ".join(f'"{name}"' for name in without)
+        yield f"inputs.range: missing for {names}: [accuracy] needs one for every input that is a number"
+
+
+def _without_range(inputs: Mapping[str, Any]) -> Iterator[str]:
+    """Yields inputs, docks apart, that have no range; vectors of which no element has one by their name."""
+    ranges = inputs.get("range")
+    known = ranges if isinstance(ranges, Mapping) else {}
+    for group, size in input_groups(inputs).items():
+        if group in known or group.endswith(".docked"):
+            continue
+        elements = [f"{group}[{i}]" for i in range(1, size + 1)] or [group]
+        missing = [name for name in elements if name not in known]
+        yield from missing if len(missing) < len(elements) else [group]
 
 
 def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:

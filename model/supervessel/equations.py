@@ -158,7 +158,10 @@ def simplification(on: bool) -> Iterator[None]:
 
 @simplification(True)
 def equations(scene: Scene) -> Equations:
-    """Returns the equations of a scene, folded for what it holds constant."""
+    """Returns the equations of a scene, folded for what it holds constant.
+
+    Raises ValueError for a scene whose law is still to be chosen.
+    """
     inputs = input_variables(scene)
     p_names, k_names, u_names = (
         tuple(variable.name for variable in inputs if variable.part == part)

@@ -161,6 +161,8 @@ Direction = Annotated[
 AngularVelocity = Annotated[Vector, vector("rad/s", "three finite numbers")]
 Seconds = Annotated[float, number("s", "a finite number > 0", 0.0, open_low=True)]
 Angle = Annotated[float, number("rad", "a number from 1e-6 to 1", 1e-6, 1.0)]
+AttitudeError = Annotated[float, number("rad", "a number from 1e-15, what doubles tell, to 1", 1e-15, 1.0)]
+RateError = Annotated[float, number("rad/s", "a finite number > 0", 0.0, open_low=True)]
 Tolerance = Annotated[float, number("", "a number from 1e-15 to 0.1", 1e-15, 0.1)]
 Course = Annotated[tuple[tuple[float, float], ...], BeforeValidator(_course)]
 Bounds = Annotated[tuple[float, float], vector("", "two finite numbers [low, high]", size=2)]

@@ -15,6 +15,7 @@ from supervessel.quantities import (
     Angle,
     AngularVelocity,
     Attitude,
+    AttitudeError,
     Bounds,
     Course,
     Direction,
@@ -22,6 +23,7 @@ from supervessel.quantities import (
     Matrix,
     Pmi,
     Position,
+    RateError,
     Seconds,
     Tensor,
     Tolerance,
@@ -34,6 +36,9 @@ PARALLEL_LIMIT = 1e-6
 """Angle [rad] between alignment and +-direction below which a port has no usable alignment."""
 PERPENDICULAR_LIMIT = 1e-3
 """Departure [rad] of alignment from the plane across direction that a scene file may have."""
+
+MOST_STEPS = 1_000_000
+"""Communication steps that are flown: each input that moves takes eight bytes of each."""
 
 OUTPUT_NAMES = (
     "mass",
@@ -224,6 +229,20 @@ class Experiment(Table):
     inputs: dict[str, Course] = Field(default_factory=dict)
 
 
+class Accuracy(Table):
+    """How exact the motion shall be: law, propagator and its setting are then chosen.
+
+    attitude, rate : largest error [rad], [rad/s]; rate None: any
+    horizon        : from the start until when [s]
+    step           : communication step [s]
+    """
+
+    attitude: AttitudeError
+    rate: RateError | None = None
+    horizon: Seconds
+    step: Seconds
+
+
 class Outputs(Table):
     """The outputs that the FMU has."""
 
@@ -249,6 +268,7 @@ class Scene(Table):
     docks: tuple[Dock, ...] = ()
     inputs: Inputs = Inputs()
     rotation: Rotation = Rotation()
+    accuracy: Accuracy | None = None
     experiment: Experiment | None = None
     outputs: Outputs = Outputs()
 
@@ -287,6 +307,11 @@ class Scene(Table):
         raise KeyError(name)
 
     @property
+    def is_chosen(self) -> bool:
+        """Whether law and propagator are known: as given, or as `[accuracy]` has been answered."""
+        return self.accuracy is None or "law" in self.rotation.model_fields_set
+
+    @property
     def keeps(self) -> dict[str, Kept]:
         """What a change keeps, for the kinds of change that inputs can make: "mass" (and moments), "pose".
 
@@ -311,6 +336,15 @@ def keeps_momentum(scene: Scene) -> bool:
     return set(scene.keeps.values()) == {"momentum"}
 
 
+CHOSEN = ("law", "propagator", "tolerance", "max_angle_step")
+"""Keys of `[rotation]` that are chosen where a scene has `[accuracy]`."""
+
+
+def without_accuracy(scene: Scene) -> Scene:
+    """Returns the scene without `[accuracy]`: with the law that it has, or by default."""
+    return scene.model_copy(update={"accuracy": None})
+
+
 def changes_rate(scene: Scene) -> bool:
     """Whether a change of inputs can change the angular velocity."""
     changing = "momentum" in scene.keeps.values() or bool(scene.inputs.docked)
@@ -325,6 +359,7 @@ TABLES: dict[tuple[str, ...], type[Table]] = {
     ("docks", "*"): Dock,
     ("inputs",): Inputs,
     ("rotation",): Rotation,
+    ("accuracy",): Accuracy,
     ("experiment",): Experiment,
     ("outputs",): Outputs,
 }

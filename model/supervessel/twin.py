@@ -81,7 +81,7 @@ class Twin(Plant):
     that it is finite: the FMU refuses a negative mass, parallel port axes, two ships at one port; the twin is
     a formula that an optimiser may take there. `p_with` refuses what an input can never have.
 
-    scene      : from `load_scene`
+    scene      : from `load_scene`; with `[accuracy]`, as `choose` finds it
     propagator : "rk4" and so on, instead of the scene's
     doublings  : of free motion, "exact" and "split", in a step: room for a phase of FIRST_ANGLE 2^doublings,
                  about the angle turned; where more is needed the step is NaN, as it is beyond 2e9 rad (which

@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from supervessel.accuracy import choose
 from supervessel.changes import followed
 from supervessel.control.error_state import ErrorForm
 from supervessel.control.functions import TwinFunction
@@ -46,6 +47,8 @@ class Plant:
             raise ValueError(f"error_form = {error_form!r}: must be one of {', '.join(get_args(ErrorForm))}")
         if not (isinstance(doublings, int) and 0 <= doublings <= 64):
             raise ValueError(f"doublings = {doublings!r}: must be a whole number from 0 to 64")
+        if not scene.is_chosen:
+            scene, _ = choose(scene)
         if propagator is not None:
             rotation = scene.rotation.model_copy(update={"propagator": propagator})
             scene = scene.model_copy(update={"rotation": rotation})

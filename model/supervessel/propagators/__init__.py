@@ -41,7 +41,12 @@ class Plan:
 
 
 def plan_of(scene: "Scene") -> Plan:
-    """Returns what a scene asks for: its own method, or what "auto" stands for in it."""
+    """Returns what a scene asks for: its own method, or what "auto" stands for in it.
+
+    Raises ValueError for a scene whose law is still to be chosen.
+    """
+    if not scene.is_chosen:
+        raise ValueError(f'scene "{scene.name}" leaves its law to [accuracy]; supervessel.choose finds it')
     name = scene.rotation.propagator
     if name != "auto":
         chosen = PROPAGATORS[name]

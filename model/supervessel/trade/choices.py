@@ -118,6 +118,7 @@ def by_angle(model: Model, *, quick: bool) -> list[Choice]:
 def variant_of(scene: Scene, choice: Choice) -> Scene:
     """Returns the scene that a choice is built from; a tolerance is left to whoever flies it."""
     raw: dict[str, Any] = scene.model_dump(exclude_none=True)
+    raw.pop("accuracy", None)
     rotation = raw["rotation"] | {"law": choice.model.law, "propagator": choice.propagator}
     if choice.angle is not None:
         rotation["max_angle_step"] = choice.angle

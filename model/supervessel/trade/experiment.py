@@ -7,12 +7,9 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from supervessel.scene import Experiment, Scene
+from supervessel.scene import MOST_STEPS, Experiment, Scene
 
 Array = NDArray[np.float64]
-
-MOST_STEPS = 1_000_000
-"""Communication steps of an experiment: each input that moves takes eight bytes of each."""
 
 SLACK = 1e-9
 """Of a step: so much nearer than a communication point counts as at it, for `k * step` is rounded."""

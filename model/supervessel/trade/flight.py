@@ -19,6 +19,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
+from supervessel.equations import Equations, equations
 from supervessel.scene import Scene
 from supervessel.trade.choices import SHOWN, Choice, variant_of
 from supervessel.trade.experiment import Course, TradeError, course_of
@@ -63,9 +64,10 @@ class Flown:
 
 
 @dataclass(frozen=True)
-class _Built:
-    """A choice's library, and what must be known to call it."""
+class Built:
+    """A choice's library, what must be known to call it, and what it was made from."""
 
+    model: Equations
     library: Path
     token: str
     references: dict[str, int]
@@ -73,18 +75,22 @@ class _Built:
 
 @dataclass(frozen=True)
 class Workshop:
-    """Where a trade works: a folder for as long as it lasts, and what has been built there."""
+    """Where a trade works: a folder for as long as it lasts, and what has been built there.
+
+    trial : whether libraries are compiled without optimisation: the same numbers, slower, much sooner there
+    """
 
     folder: Path
-    built: dict[Choice, _Built]
+    built: dict[Choice, Built]
+    trial: bool = False
 
 
 @contextmanager
-def workshop() -> Iterator[Workshop]:
+def workshop(*, trial: bool = False) -> Iterator[Workshop]:
     """Yields a workshop, removed afterwards. Raises TradeError where there is no room for it or in it."""
     try:
         with tempfile.TemporaryDirectory(prefix="supervessel-") as name:
-            yield Workshop(Path(name), {})
+            yield Workshop(Path(name), {}, trial)
     except OSError as error:
         place = error.filename or tempfile.gettempdir()
         raise TradeError(f"{place}: no room to work in: {error.strerror}") from None
@@ -108,25 +114,27 @@ def fly_all(
             found[choice] = kept
             done(str(choice))
     missing = [choice for choice in choices if choice not in found]
-    _build_all(scene, missing, shop, done)
+    build_all(scene, missing, shop, done)
     for choice in missing:
-        found[choice] = _fly(shop.built[_source_of(choice)], choice, course, shop.folder)
+        found[choice] = _fly(shop.built[source_of(choice)], choice, course, shop)
         if found[choice].refused != OUT_OF_TIME:  # another time there may be more of it
             _keep(places[choice], found[choice])
         done(str(choice))
     return found
 
 
-def _build_all(scene: Scene, choices: Sequence[Choice], shop: Workshop, done: Callable[[str], None]) -> None:
+def build_all(scene: Scene, choices: Sequence[Choice], shop: Workshop, done: Callable[[str], None]) -> None:
     """Builds the libraries of choices, and the host's, as far as they are not there."""
-    wanted = [choice for choice in dict.fromkeys(map(_source_of, choices)) if choice not in shop.built]
+    wanted = [choice for choice in dict.fromkeys(map(source_of, choices)) if choice not in shop.built]
     if not wanted:
         return
     _build_host(shop.folder)
     pool = ThreadPoolExecutor(AT_ONCE)
     try:
         futures = {
-            choice: pool.submit(_build, variant_of(scene, choice), shop.folder / f"b{len(shop.built) + i}")
+            choice: pool.submit(
+                _build, variant_of(scene, choice), shop.folder / f"b{len(shop.built) + i}", trial=shop.trial
+            )
             for i, choice in enumerate(wanted)
         }
         for choice, future in futures.items():
@@ -136,27 +144,29 @@ def _build_all(scene: Scene, choices: Sequence[Choice], shop: Workshop, done: Ca
         pool.shutdown(cancel_futures=True)
 
 
-def _source_of(choice: Choice) -> Choice:
+def source_of(choice: Choice) -> Choice:
     """Returns the choice whose library this one is flown with."""
     return Choice(choice.model, choice.propagator, choice.angle)
 
 
 def builds(choices: Sequence[Choice], shop: Workshop) -> int:
     """Returns how many libraries choices need that are not there."""
-    return len({_source_of(choice) for choice in choices} - shop.built.keys())
+    return len({source_of(choice) for choice in choices} - shop.built.keys())
 
 
-def _build(scene: Scene, folder: Path) -> _Built:
+def _build(scene: Scene, folder: Path, *, trial: bool) -> Built:
     """Returns the library of a scene's FMU."""
     # Package fmu_build is built on this one: looked up only here.
     from fmu_build.build import compile_sources, generate  # noqa: PLC0415
+    from fmu_build.compiler import FLAGS, TRIAL_FLAGS  # noqa: PLC0415
     from fmu_build.platforms import host_platform  # noqa: PLC0415
     from fmu_build.sources import source_file_names, source_files  # noqa: PLC0415
 
-    sources, description = generate(scene, 3)
+    model, flags = equations(scene), TRIAL_FLAGS if trial else FLAGS
+    sources, description = generate(scene, 3, model)
     packed = source_files(sources, 3, scene.name)
     names = source_file_names(sources, 3)
-    [(path, library)] = compile_sources(packed, names, 3, (host_platform(),), scene.name).items()
+    [(path, library)] = compile_sources(packed, names, 3, (host_platform(),), scene.name, flags).items()
     file = folder / Path(path).name
     folder.mkdir()
     file.write_bytes(library)
@@ -164,7 +174,7 @@ def _build(scene: Scene, folder: Path) -> _Built:
     variables = root.find("ModelVariables")
     assert variables is not None
     references = {v.attrib["name"]: int(v.attrib["valueReference"]) for v in variables}
-    return _Built(file, root.attrib["instantiationToken"], references)
+    return Built(model, file, root.attrib["instantiationToken"], references)
 
 
 def _host(folder: Path) -> Path:
@@ -183,39 +193,29 @@ def _build_host(folder: Path) -> None:
         compile_library([HERE / "host.c"], host_platform(), _host(folder))
 
 
-def _fly(built: _Built, choice: Choice, course: Course, folder: Path) -> Flown:
+def _fly(built: Built, choice: Choice, course: Course, shop: Workshop) -> Flown:
     """Returns what came of a flight in a process of its own."""
     moving = {name: v for name, v in course.numbers.items() if _is_input(built, choice, name)}
-    numbers, booleans = folder / "numbers", folder / "booleans"
-    numbers.write_bytes(_columns(moving, course.steps, np.dtype(np.float64)))
-    booleans.write_bytes(_columns(course.booleans, course.steps, np.dtype(np.bool_)))
-    shown = [f"{name}[{i}]" for name, n in zip(SHOWN, (4, 3), strict=True) for i in range(1, n + 1)]
+    inputs = Inputs(
+        np.arange(course.steps),
+        np.column_stack([np.zeros((course.steps, 0)), *moving.values()]),
+        np.column_stack([np.zeros((course.steps, 0)), *course.booleans.values()]),
+    )
     job = {
-        "host": str(_host(folder)),
-        "library": str(built.library),
-        "token": built.token,
         "tolerance": choice.tolerance or 0.0,
         "size": course.size,
         "last_size": course.last_size,
         "steps": course.steps,
-        "number_references": [built.references[name] for name in moving],
-        "boolean_references": [built.references[name] for name in course.booleans],
-        "shown": [built.references[name] for name in shown],
-        "numbers": str(numbers),
-        "booleans": str(booleans),
         "sampled": course.sampled.tolist(),
         "seconds": TIMING,
     }
-    (folder / "job.json").write_text(json.dumps(job))
-    command = [sys.executable, "-I", str(HERE / "host.py"), str(folder / "job.json")]
-    try:
-        ended = subprocess.run(command, capture_output=True, text=True, timeout=TIME_LIMIT, check=False)
-    except subprocess.TimeoutExpired:
+    names = list(moving), list(course.booleans)
+    ended = run_host(built, shop.folder, job, names, [inputs.written(shop.folder / "inputs")])
+    if ended is None:
         return _refused(OUT_OF_TIME)
-    if ended.returncode != 0:
-        last = (ended.stderr.strip().splitlines() or ["nothing was said"])[-1]
-        raise TradeError(f"{choice}: its flight ended with status {ended.returncode}: {last}")
-    answer = json.loads(ended.stdout)
+    if isinstance(ended, str):
+        raise TradeError(f"{choice}: {ended}")
+    (answer,), raw = ended
     if answer["refused"] is not None:
         return _refused(answer["refused"])
     return Flown(
@@ -224,18 +224,80 @@ def _fly(built: _Built, choice: Choice, course: Course, folder: Path) -> Flown:
         answer["ratio"],
         answer["sub_steps"],
         built.library.stat().st_size,
-        np.array(answer["samples"]).reshape(-1, 7),
+        np.frombuffer(raw).reshape(-1, 7),
     )
 
 
-def _is_input(built: _Built, choice: Choice, name: str) -> bool:
+@dataclass(frozen=True)
+class Inputs:
+    """What inputs do in a flight.
+
+    rows     : numbers of the communication steps before which they are set, ascending, from 0
+    numbers  : values of inputs that are numbers, (rows, n)
+    booleans : of docks, (rows, m), 0 and 1
+    """
+
+    rows: NDArray[np.int64]
+    numbers: Array
+    booleans: Array
+
+    def written(self, file: Path, *, once: bool = False) -> dict[str, Any]:
+        """Writes them into files that begin with that name and returns how host.py finds them.
+
+        once : whether files that are there already are these
+        """
+        kinds = {"rows": np.int64, "numbers": np.float64, "booleans": np.bool_}
+        places = {key: file.with_suffix(f".{key}") for key in kinds}
+        for key, kind in () if once and places["booleans"].exists() else kinds.items():
+            places[key].write_bytes(np.ascontiguousarray(getattr(self, key), dtype=kind).tobytes() or b"\0")
+        return {key: str(place) for key, place in places.items()} | {"row_count": len(self.rows)}
+
+
+def run_host(
+    built: Built,
+    folder: Path,
+    job: Mapping[str, Any],
+    names: tuple[Sequence[str], Sequence[str]],
+    courses: Sequence[Mapping[str, Any]],
+) -> tuple[list[dict[str, Any]], bytes] | str | None:
+    """Returns what came of a job in a process of its own, see host.py, and the samples that it has left.
+
+    folder  : of the workshop
+    job     : tolerance, sizes, steps, samples, timing, as host.py wants them
+    names   : of the inputs that move, numbers and docks
+    courses : what they do in each flight, as `Inputs.written` returns it
+    Returns None if the process does not end in time, a text if it breaks down.
+    """
+    shown = [f"{name}[{i}]" for name, n in zip(SHOWN, (4, 3), strict=True) for i in range(1, n + 1)]
+    with tempfile.TemporaryDirectory(dir=folder, prefix="job-") as place:
+        file, samples = Path(place, "job.json"), Path(place, "samples")
+        whole = {
+            "judge": False,
+            **job,
+            "host": str(_host(folder)),
+            "library": str(built.library),
+            "token": built.token,
+            "number_references": [built.references[name] for name in names[0]],
+            "boolean_references": [built.references[name] for name in names[1]],
+            "shown": [built.references[name] for name in shown],
+            "courses": list(courses),
+            "samples": str(samples),
+        }
+        file.write_text(json.dumps(whole))
+        command = [sys.executable, "-I", str(HERE / "host.py"), str(file)]
+        try:
+            ended = subprocess.run(command, capture_output=True, text=True, timeout=TIME_LIMIT, check=False)
+        except subprocess.TimeoutExpired:
+            return None
+        if ended.returncode != 0:
+            last = (ended.stderr.strip().splitlines() or ["nothing was said"])[-1]
+            return f"its flight ended with status {ended.returncode}: {last}"
+        return json.loads(ended.stdout), samples.read_bytes()
+
+
+def _is_input(built: Built, choice: Choice, name: str) -> bool:
     """Whether an input is left; only those of what is frozen are not."""
     return name in built.references or not choice.model.frozen
-
-
-def _columns(values: dict[str, Array], steps: int, kind: np.dtype[Any]) -> bytes:
-    """Returns inputs step by step."""
-    return np.column_stack(list(values.values())).astype(kind).tobytes() if values else bytes(steps and 1)
 
 
 def _refused(reason: str) -> Flown:
@@ -248,12 +310,12 @@ def _refused(reason: str) -> Flown:
 def _place(scene: Scene, choice: Choice) -> Path:
     from fmu_build.compiler import compiler_cache  # noqa: PLC0415
 
-    said = json.dumps([scene.model_dump(mode="json"), asdict(choice), _maker()], sort_keys=True)
+    said = json.dumps([scene.model_dump(mode="json"), asdict(choice), maker()], sort_keys=True)
     return compiler_cache() / "trade" / f"{hashlib.sha256(said.encode()).hexdigest()}.json"
 
 
 @cache
-def _maker() -> list[str]:
+def maker() -> list[str]:
     """Returns what turns a choice into a result: this machine, versions, our own files."""
     import fmu_build  # noqa: PLC0415
 

@@ -40,11 +40,13 @@ typedef struct {
     long long steps;
     long long number_count, boolean_count; /* of inputs that move */
     const fmi3ValueReference *number_references, *boolean_references, *shown;
-    const double *numbers;       /* steps x number_count */
-    const fmi3Boolean *booleans; /* steps x boolean_count */
+    long long row_count;
+    const long long *rows;       /* numbers of the steps before which inputs are set, ascending, from 0 */
+    const double *numbers;       /* row_count x number_count */
+    const fmi3Boolean *booleans; /* row_count x boolean_count */
     long long sample_count;
     const long long *sampled; /* numbers of steps, ascending, from 1 */
-    double seconds;           /* for timing; three rounds may take ten times as long */
+    double seconds;           /* for timing; three rounds may take ten times as long; 0: no timing */
 } Flight;
 
 typedef struct {
@@ -137,22 +139,22 @@ static void count_sub_step(fmi3InstanceEnvironment environment, double time, boo
     *returns = false;
 }
 
-static bool set_inputs(const Functions *fmu, fmi3Instance f, const Flight *flight, long long step) {
+static bool set_inputs(const Functions *fmu, fmi3Instance f, const Flight *flight, long long row) {
     const size_t n = (size_t)flight->number_count, b = (size_t)flight->boolean_count;
     fmi3Status status = fmi3OK;
-    if (b) status = fmu->set_booleans(f, flight->boolean_references, b, flight->booleans + (size_t)step * b, b);
+    if (b) status = fmu->set_booleans(f, flight->boolean_references, b, flight->booleans + (size_t)row * b, b);
     if (n && status == fmi3OK)
-        status = fmu->set_numbers(f, flight->number_references, n, flight->numbers + (size_t)step * n, n);
+        status = fmu->set_numbers(f, flight->number_references, n, flight->numbers + (size_t)row * n, n);
     return status == fmi3OK;
 }
 
-/* Returns an instance at the experiment's start, NULL if there is none. */
-static fmi3Instance begin(const Functions *fmu, const Flight *flight, Report *report, bool watched) {
+/* Returns an instance at the start with a row's inputs, NULL if there is none. */
+static fmi3Instance begin(const Functions *fmu, const Flight *flight, Report *report, bool watched, long long row) {
     fmi3Instance f = fmu->instantiate("trade", flight->token, NULL, false, watched, false, false, NULL, 0, report,
                                       note, watched ? count_sub_step : NULL);
     if (!f) return NULL;
     if (fmu->enter(f, flight->tolerance > 0.0, flight->tolerance, 0.0, false, 0.0) == fmi3OK &&
-        set_inputs(fmu, f, flight, 0) && fmu->leave(f) == fmi3OK)
+        set_inputs(fmu, f, flight, row) && fmu->leave(f) == fmi3OK)
         return f;
     fmu->release(f);
     return NULL;
@@ -164,14 +166,14 @@ static bool fly(const Functions *fmu, fmi3Instance f, const Flight *flight, Repo
                 double least[CHUNKS]) {
     bool event, terminate, early;
     double time = 0.0, shown[SHOWN];
-    long long next = 0, i = 0;
+    long long next = 0, row = 0, i = 0;
     for (int chunk = 0; chunk < CHUNKS; chunk++) {
         const long long end = flight->steps * (chunk + 1) / CHUNKS;
         const double start = seconds_now();
         for (; i < end; i++) {
             const double size = i + 1 < flight->steps ? flight->size : flight->last_size;
             report->failed_at = time;
-            if (!set_inputs(fmu, f, flight, i)) return false;
+            if (row < flight->row_count && flight->rows[row] == i && !set_inputs(fmu, f, flight, row++)) return false;
             if (fmu->step(f, time, size, true, &event, &terminate, &early, &time) != fmi3OK) return false;
             if (fmu->get(f, flight->shown, SHOWN, shown, SHOWN) != fmi3OK) return false;
             if (samples && next < flight->sample_count && flight->sampled[next] == i + 1)
@@ -188,18 +190,19 @@ VISIBLE int trade_fly(const Functions *fmu, const Flight *flight, Report *report
     double least[CHUNKS], plain = 1.0, sink = 0.0, taken = 0.0;
     for (int chunk = 0; chunk < CHUNKS; chunk++) least[chunk] = HUGE_VAL;
     memset(report, 0, sizeof *report);
-    fmi3Instance f = begin(fmu, flight, report, true);
+    fmi3Instance f = begin(fmu, flight, report, true, 0);
     if (!f) return 1;
     const bool arrived = fly(fmu, f, flight, report, samples, least);
     fmu->release(f);
     if (!arrived) return 1;
+    if (!(flight->seconds > 0.0)) return 0;
     for (int chunk = 0; chunk < CHUNKS; chunk++) least[chunk] = HUGE_VAL;
     const double begun = seconds_now(), clock = seconds_of_clock();
     for (int round = 0; round < MOST_ROUNDS; round++) {
         const double spent = seconds_now() - begun;
         if (spent > flight->seconds && (round >= LEAST_ROUNDS || spent > 10.0 * flight->seconds)) break;
         plain = smaller(plain, plain_seconds(&sink));
-        f = begin(fmu, flight, report, false);
+        f = begin(fmu, flight, report, false, 0);
         if (!f) return 1;
         const bool again = fly(fmu, f, flight, report, NULL, least);
         fmu->release(f);
@@ -212,4 +215,14 @@ VISIBLE int trade_fly(const Functions *fmu, const Flight *flight, Report *report
     report->nanoseconds = 1e9 * taken / (double)flight->steps;
     report->ratio = taken / (double)flight->steps / plain;
     return isfinite(sink) ? 0 : 1;
+}
+
+/* Whether an instance can start with each row's inputs, 1 or 0. */
+VISIBLE void trade_judge(const Functions *fmu, const Flight *flight, unsigned char *usable) {
+    Report report;
+    for (long long row = 0; row < flight->row_count; row++) {
+        fmi3Instance f = begin(fmu, flight, &report, false, row);
+        usable[row] = f != NULL;
+        if (f) fmu->release(f);
+    }
 }

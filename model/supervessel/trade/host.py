@@ -36,6 +36,8 @@ class Flight(ctypes.Structure):
         ("number_references", ctypes.c_void_p),
         ("boolean_references", ctypes.c_void_p),
         ("shown", ctypes.c_void_p),
+        ("row_count", ctypes.c_longlong),
+        ("rows", ctypes.c_void_p),
         ("numbers", ctypes.c_void_p),
         ("booleans", ctypes.c_void_p),
         ("sample_count", ctypes.c_longlong),
@@ -56,48 +58,62 @@ class Report(ctypes.Structure):
     )
 
 
-def fly(job: dict[str, Any]) -> dict[str, Any]:
-    """Returns what came of a job, as `flight.fly` lays it out."""
+def fly(job: dict[str, Any]) -> list[dict[str, Any]]:
+    """Returns what came of a job's courses, as `flight.py` lays them out, up to the first that is refused.
+
+    Samples go into a file, a course's after those of the one before. A job may ask to judge rows of inputs
+    instead: a byte each, 1 where an instance can start with them.
+    """
     host, fmu = ctypes.CDLL(job["host"]), ctypes.CDLL(job["library"])
     functions = (ctypes.c_void_p * len(FUNCTIONS))(
         *(ctypes.cast(getattr(fmu, name), ctypes.c_void_p).value for name in FUNCTIONS)
     )
-    kept = [
+    references = [
         (ctypes.c_uint32 * len(job[key]))(*job[key])
         for key in ("number_references", "boolean_references", "shown")
     ]
-    numbers, booleans = (
-        ctypes.create_string_buffer(Path(job[key]).read_bytes()) for key in ("numbers", "booleans")
-    )
     sampled = (ctypes.c_longlong * len(job["sampled"]))(*job["sampled"])
-    flight = Flight(
-        job["token"].encode(),
-        job["tolerance"],
-        job["size"],
-        job["last_size"],
-        job["steps"],
-        len(kept[0]),
-        len(kept[1]),
-        *(ctypes.addressof(array) for array in kept),
-        ctypes.addressof(numbers),
-        ctypes.addressof(booleans),
-        len(sampled),
-        ctypes.addressof(sampled),
-        job["seconds"],
-    )
     samples = (ctypes.c_double * (SHOWN * len(sampled)))()
-    report = Report()
-    failed = host.trade_fly(functions, ctypes.byref(flight), ctypes.byref(report), samples)
-    if failed:
-        message = report.message.decode(errors="replace") or "a call did not succeed"
-        return {"refused": f"at {report.failed_at:.10g} s: {message}"}
-    return {
-        "refused": None,
-        "nanoseconds": report.nanoseconds,
-        "ratio": report.ratio,
-        "sub_steps": report.sub_steps,
-        "samples": list(samples),
-    }
+    found: list[dict[str, Any]] = []
+    with Path(job["samples"]).open("wb") as file:
+        for course in job["courses"]:
+            kept = [
+                ctypes.create_string_buffer(Path(course[key]).read_bytes())
+                for key in ("rows", "numbers", "booleans")
+            ]
+            flight = Flight(
+                job["token"].encode(),
+                job["tolerance"],
+                job["size"],
+                job["last_size"],
+                job["steps"],
+                *(len(array) for array in references[:2]),
+                *(ctypes.addressof(array) for array in references),
+                course["row_count"],
+                *(ctypes.addressof(array) for array in kept),
+                len(sampled),
+                ctypes.addressof(sampled),
+                job["seconds"],
+            )
+            if job["judge"]:
+                usable = (ctypes.c_ubyte * course["row_count"])()
+                host.trade_judge(functions, ctypes.byref(flight), usable)
+                file.write(usable)
+                continue
+            report = Report()
+            if host.trade_fly(functions, ctypes.byref(flight), ctypes.byref(report), samples):
+                message = report.message.decode(errors="replace") or "a call did not succeed"
+                return [*found, {"refused": f"at {report.failed_at:.10g} s: {message}"}]
+            file.write(samples)
+            found.append(
+                {
+                    "refused": None,
+                    "nanoseconds": report.nanoseconds,
+                    "ratio": report.ratio,
+                    "sub_steps": report.sub_steps,
+                }
+            )
+    return found
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supervessel.scene import Scene
+from supervessel.scene import Scene, without_accuracy
 from supervessel.trade.choices import (
     BEST,
     Choice,
@@ -60,6 +60,7 @@ def study(scene: Scene, *, quick: bool = False, progress: Progress = lambda *_: 
     Raises TradeError if the scene has no experiment or cannot run it, or if results cannot be kept,
     BuildError if the compiler fails.
     """
+    scene = without_accuracy(scene)  # a trade tries every law itself
     course = course_of(scene)
     tried = models(scene, quick=quick)
     with workshop() as shop:

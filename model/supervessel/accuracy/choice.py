@@ -1,0 +1,156 @@
+"""The cheapest law and propagator by which a scene is as exact as `[accuracy]` asks, and what shows it."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from supervessel.accuracy.flights import LONG, AccuracyError, place_of, read
+from supervessel.accuracy.search import MARGIN, Progress, Search, Tried, begun
+from supervessel.scene import CHOSEN, Accuracy, Rotation, Scene
+from supervessel.trade.choices import BEST, Choice, reference_choices
+from supervessel.trade.flight import workshop, write_whole
+
+CLAIM = (
+    "From the scene's start, in communication steps of that length, with inputs anywhere in their ranges and "
+    "held over each step, the error stays within what is asked up to the horizon: against the exact motion "
+    "under the law tensor with the same inputs. It is shown by flights, not proven."
+)
+
+NOT_COVERED = (
+    "another state at the start, other communication steps, a tolerance that an importer gives",
+    "model exchange, where the importer's solver integrates",
+    "what the law tensor itself leaves out: parts that bend, propellant that sloshes; errors of the inputs",
+    "inputs that make no sense in themselves, which the FMU discards",
+)
+
+
+def choose(scene: Scene, progress: Progress = lambda _: None) -> tuple[Scene, dict[str, Any]]:
+    """Returns the scene with law, propagator and setting that `[accuracy]` asks for, and the evidence.
+
+    The cheapest candidate, by counted operations, whose flights through histories of inputs keep the
+    accuracy with a margin: a dictionary says what was asked, flown and found. What has been found is kept
+    in the user's cache: the same again takes no time. `build_fmu` and `Twin` choose by themselves.
+
+    scene    : with `[accuracy]`
+    progress : told what is being done
+    Raises ValueError for a scene without it, AccuracyError where nothing meets it, BuildError if the
+    compiler fails.
+
+    Example:
+        >>> from supervessel import choose, parse_scene
+        >>> ball = {"name": "ball", "root": "B", "vessels": {"B": {"mass": 1.0, "pmi": [1.0, 2.0, 2.0]}}}
+        >>> asked = {"accuracy": {"attitude": 1e-6, "horizon": 10.0, "step": 0.1}}
+        >>> spin = {"rotation": {"angular_velocity": [0.1, 0.0, 0.0]}}
+        >>> chosen, evidence = choose(parse_scene(ball | asked | spin))
+        >>> chosen.rotation.law, chosen.rotation.propagator
+        ('none', 'rk4')
+    """
+    accuracy = scene.accuracy
+    if accuracy is None:
+        raise ValueError(f'scene "{scene.name}" has no [accuracy]: nothing is to be chosen')
+    given = scene.rotation.model_dump(exclude_unset=True)
+    opened = {key: value for key, value in given.items() if key not in CHOSEN}
+    whole = scene.model_copy(update={"rotation": Rotation.model_validate(opened)})
+    place = place_of(whole, "choice")
+    kept = read(place)
+    if kept is None:
+        kept = _chosen(whole, accuracy, progress)
+        write_whole(place, json.dumps(kept).encode())
+    rotation = opened | kept["choice"]
+    if rotation["law"] == "none":  # keeps the rate always
+        rotation = {
+            key: value for key, value in rotation.items() if key not in ("mass_change", "pose_change")
+        }
+    chosen = Rotation.model_validate(rotation)
+    if scene.is_chosen and scene.rotation != chosen:
+        raise AccuracyError("accuracy: [rotation] has been changed since it was chosen")
+    return scene.model_copy(update={"rotation": chosen}), kept
+
+
+def _chosen(scene: Scene, accuracy: Accuracy, progress: Progress) -> dict[str, Any]:
+    """Returns the evidence. Raises AccuracyError where nothing meets what is asked."""
+    brief = accuracy.horizon <= LONG * accuracy.step
+    with workshop(trial=brief) as shop:
+        search = begun(scene, accuracy, shop, progress)
+        search.run()
+    best = search.best
+    if best is None:
+        raise AccuracyError(_refusal(search, accuracy))
+    course, (attitude, rate) = search.every.course, search.doubt
+    return {
+        "scene": scene.name,
+        "asked": accuracy.model_dump(mode="json"),
+        "claim": CLAIM,
+        "not_covered": list(NOT_COVERED),
+        "margin": MARGIN,
+        "choice": _settings(best.choice),
+        "attitude": _brief(best.attitude),
+        "rate": _brief(best.rate),
+        "operations": _brief(best.operations),
+        "histories": [history.name for history in search.every.flown],
+        "steps": course.steps,
+        "looked_at": len(course.sampled),
+        "rows_drawn": search.every.drawn,
+        "rows_senseless": search.every.senseless,
+        "truth": [str(choice) for choice in reference_choices(scene, BEST)],
+        "doubt": {"attitude": _brief(attitude.max()), "rate": _brief(rate.max())},
+        "candidates": [
+            _settings(one.choice)
+            | {
+                "operations": _brief(one.operations),
+                "attitude": None if one.refused else _brief(one.attitude),
+                "rate": None if one.refused else _brief(one.rate),
+                "worst": one.worst,
+                "flights": one.flights,
+                "refused": one.refused,
+                "enough": one.excess(accuracy) <= 1.0,
+            }
+            for one in search.tried.values()
+        ],
+        "dearer": [
+            _settings(choice) | {"operations": _brief(at_least)} for choice, at_least in search.left.items()
+        ],
+    }
+
+
+def _settings(choice: Choice) -> dict[str, Any]:
+    """Returns a choice as keys of [rotation]."""
+    found: dict[str, Any] = {"law": choice.model.law, "propagator": choice.propagator}
+    if choice.angle is not None:
+        found["max_angle_step"] = choice.angle
+    if choice.tolerance is not None:
+        found["tolerance"] = choice.tolerance
+    return found
+
+
+def _refusal(search: Search, accuracy: Accuracy) -> str:
+    """Returns why there is no choice, and the best that there is."""
+    nearest: Tried = min(search.tried.values(), key=lambda one: one.excess(accuracy))
+    asked = f"attitude = {accuracy.attitude} rad"
+    reached = f"{MARGIN * nearest.attitude:.2g} rad"
+    if accuracy.rate is not None:
+        asked += f", rate = {accuracy.rate} rad/s"
+        reached += f" and {MARGIN * nearest.rate:.2g} rad/s"
+    return (
+        f"accuracy: {asked} up to {accuracy.horizon:g} s: nothing meets it; the best is {reached}, a margin "
+        f"of {MARGIN:g} included, by {nearest.choice}"
+    )
+
+
+def _brief(value: float) -> float:
+    """Returns a number rounded to three digits: what is below differs between C libraries."""
+    return float(f"{value:.3g}")
+
+
+def said(evidence: Mapping[str, Any]) -> str:
+    """Returns in one line what was chosen."""
+    choice, asked = evidence["choice"], evidence["asked"]
+    settings = ", ".join(
+        f"{key} = {json.dumps(value) if isinstance(value, str) else f'{value:g}'}"
+        for key, value in choice.items()
+    )
+    found = f"{evidence['attitude']:.1e} rad of {asked['attitude']:g} rad"
+    if asked["rate"] is not None:
+        found += f", {evidence['rate']:.1e} rad/s of {asked['rate']:g} rad/s"
+    flown = f"largest error in {len(evidence['histories'])} flights of {asked['horizon']:g} s"
+    return f"{settings}: {flown} {found}"

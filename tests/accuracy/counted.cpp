@@ -1,0 +1,43 @@
+/* Runs fmu_build/c/taylor.c with numbers that count what is done to them: slow operations as five. */
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+
+static long operations;
+
+struct Counted {
+    double value;
+    Counted() = default;
+    Counted(double v) : value(v) {}
+};
+
+static Counted did(double value, long count) {
+    operations += count;
+    return Counted(value);
+}
+
+static Counted operator+(Counted a, Counted b) { return did(a.value + b.value, 1); }
+static Counted operator-(Counted a, Counted b) { return did(a.value - b.value, 1); }
+static Counted operator*(Counted a, Counted b) { return did(a.value * b.value, 1); }
+static Counted operator/(Counted a, Counted b) { return did(a.value / b.value, 5); }
+static Counted operator-(Counted a) { return did(-a.value, 1); }
+static Counted &operator+=(Counted &a, Counted b) { return a = a + b; }
+static bool operator>(Counted a, Counted b) { return a.value > b.value; }
+static Counted sqrt(Counted a) { return did(std::sqrt(a.value), 5); }
+
+#define double Counted
+#include "taylor.c"
+
+/* counted ORDER: prints what a sub-step takes. */
+int main(int count, char **arguments) {
+    if (count < 2) return 1;
+    static Series series;
+    series.order = atoi(arguments[1]);
+    const Counted x[7] = {1.0, 0.0, 0.0, 0.0, 0.1, 0.2, 0.3}, push[3] = {0.1, 0.2, 0.3};
+    const Counted map[12] = {0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+    Counted next[7];
+    taylor_series(x, push, map, 0.1, &series);
+    taylor_sum(&series, x, map, 1.0, next);
+    printf("%ld\n", operations);
+    return 0;
+}

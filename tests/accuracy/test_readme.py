@@ -1,0 +1,43 @@
+"""README's section on accuracy, recomputed."""
+
+import re
+import tomllib
+from pathlib import Path
+
+from supervessel import choose, parse_scene
+from supervessel.accuracy import said
+from support import variant
+
+ROOT = Path(__file__).parents[2]
+SECTION = (ROOT / "README.md").read_text(encoding="utf-8").partition("## Asking for accuracy\n")[2]
+
+
+def asked(attitude):
+    """The scene of the section, or with another accuracy."""
+    raw = tomllib.loads((ROOT / "examples" / "iss_dg.toml").read_text())
+    block = re.search(r"```toml\n(.*?)```", SECTION, re.DOTALL)
+    assert block is not None
+    raw |= tomllib.loads(block[1])
+    return parse_scene(variant(raw, {"accuracy.attitude": attitude or raw["accuracy"]["attitude"]}))
+
+
+def row(attitude):
+    _, evidence = choose(asked(attitude))
+    choice = evidence["choice"]
+    values = [f"`{choice['law']}`", f"`{choice['propagator']}`"]
+    values += [f"{key} {choice[key]:g}" for key in ("tolerance", "max_angle_step") if key in choice]
+    cells = f"{attitude:g}", ", ".join(values), f"{evidence['operations']:g}", f"{evidence['attitude']:.1e}"
+    return f"| {' | '.join(cells)} |"
+
+
+def test_the_line_is_what_the_scene_gives():
+    block = re.search(r"```text\n(.*?)\n```", SECTION, re.DOTALL)
+    assert block is not None
+    assert block[1] == said(choose(asked(None))[1])
+
+
+def test_the_table_is_what_the_scene_gives():
+    rows = re.findall(r"^\| (\S+) \| `.*$", SECTION.partition("\n## ")[0], re.MULTILINE)
+    assert len(rows) == 4
+    for attitude in rows:
+        assert row(float(attitude)) in SECTION

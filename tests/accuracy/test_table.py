@@ -1,0 +1,208 @@
+"""The table `[accuracy]`: what is read, and what is refused, by place and value."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from supervessel import SceneError, parse_scene
+from supervessel.scene import without_accuracy
+from supervessel.trade.choices import Choice, Model, variant_of
+from support import ISS_DG, variant
+
+ROOT = Path(__file__).parents[2]
+ACCURACY = {"attitude": 1e-4, "rate": 1e-6, "horizon": 600.0, "step": 0.1}
+SCENE = variant(
+    ISS_DG,
+    {
+        "inputs": {
+            "mass": ["DG"],
+            "torque": True,
+            "range": {"DG.mass": [11000.0, 24500.0], "torque": [-10.0, 10.0]},
+        },
+        "rotation": {"angular_velocity": [0.0, 0.0011, 0.0]},
+        "accuracy": ACCURACY,
+    },
+)
+
+needs_posix = pytest.mark.skipif(os.name != "posix", reason="needs signals and ulimit")
+
+
+def problems(changes):
+    with pytest.raises(SceneError) as caught:
+        parse_scene(variant(SCENE, changes))
+    return list(caught.value.problems)
+
+
+def test_the_table_is_read_and_leaves_the_law_open():
+    scene = parse_scene(SCENE)
+    assert scene.accuracy.model_dump() == ACCURACY
+    assert not scene.is_chosen
+    assert parse_scene(variant(SCENE, {"accuracy.rate": None})).accuracy.rate is None
+    kept = {"rotation": {"mass_change": "momentum", "attitude": [1, 1, 0, 0]}}
+    assert not parse_scene(variant(SCENE, kept)).is_chosen
+    assert parse_scene(variant(SCENE, {"accuracy": None})).is_chosen
+
+
+@pytest.mark.parametrize(
+    ("changes", "problem"),
+    [
+        (
+            {"accuracy.attitude": 1e-16},
+            "accuracy.attitude = 1e-16 rad: must be a number from 1e-15, what doubles tell, to 1",
+        ),
+        (
+            {"accuracy.attitude": 2.0},
+            "accuracy.attitude = 2.0 rad: must be a number from 1e-15, what doubles tell, to 1",
+        ),
+        ({"accuracy.rate": 0.0}, "accuracy.rate = 0.0 rad/s: must be a finite number > 0"),
+        (
+            {"accuracy.rate": 1e-20},
+            "accuracy.rate = 1e-20 rad/s: must be at least 1.22e-19 rad/s, what doubles tell of this "
+            "angular_velocity",
+        ),
+        ({"accuracy.horizon": 0.0}, "accuracy.horizon = 0.0 s: must be a finite number > 0"),
+        ({"accuracy.step": -1.0}, "accuracy.step = -1.0 s: must be a finite number > 0"),
+        ({"accuracy.step": 601.0}, "accuracy.step = 601.0 s: must not exceed horizon = 600.0 s"),
+        (
+            {"accuracy.step": 1e-4},
+            "accuracy.horizon = 600.0 s: in steps of 0.0001 s that are 6e+06 steps; at most 1000000",
+        ),
+        ({"accuracy.horizon": None}, "accuracy.horizon: missing"),
+        ({"accuracy.atitude": 1.0}, 'accuracy: unknown key "atitude" (did you mean "attitude"?)'),
+        ({"accuracy": 1e-4}, "accuracy = 0.0001: must be a table"),
+        (
+            {"rotation.law": "tensor"},
+            "rotation.law: given beside [accuracy], which chooses it; leave it out",
+        ),
+        (
+            {"rotation.tolerance": 1e-9},
+            "rotation.tolerance: given beside [accuracy], which chooses it; leave it out",
+        ),
+        (
+            {"inputs.range": {"DG.mass": [11000.0, 24500.0]}},
+            'inputs.range: missing for "torque": [accuracy] needs one for every input that is a number',
+        ),
+        (
+            {"inputs.range": {"torque[2]": [0.0, 1.0]}, "inputs.pose": ["DG.nose"]},
+            'inputs.range: missing for "DG.mass", "DG.nose.position", "DG.nose.direction", '
+            '"DG.nose.alignment", "torque[1]", "torque[3]": [accuracy] needs one for every input that is a '
+            "number",
+        ),
+    ],
+)
+def test_a_table_that_leaves_nothing_to_choose_is_refused(changes, problem):
+    assert problems(changes) == [problem]
+
+
+def test_all_that_is_wrong_is_said_at_once():
+    found = problems({"rotation.law": "tensor", "rotation.propagator": "rk4", "accuracy.step": 0.0})
+    assert [text.partition(":")[0].partition(" =")[0] for text in found] == [
+        "accuracy.step",
+        "rotation.law",
+        "rotation.propagator",
+    ]
+
+
+def test_docks_need_no_range():
+    docks = [{"name": "berth", "ports": ["ISS.P2", "DG.nose"]}]
+    still = {f"berth.{key}": [0.0, 0.0] for key in ("velocity", "rate")}
+    inputs = {"docked": ["berth"], "range": still}
+    assert not parse_scene(variant(SCENE, {"docks": docks, "inputs": inputs})).is_chosen
+
+
+TEXT = """\
+name = "ball"
+root = "B"
+[vessels.B]
+mass = 1.0
+pmi = [1.0, 1.6, 2.4]
+[inputs]
+torque = true
+[inputs.range]
+torque = [-0.1, 0.1]
+[accuracy]
+attitude = 1e-6
+horizon = 50.0
+step = 0.1
+"""
+
+
+def command(limit=""):
+    build = f"{sys.executable} -m fmu_build ball.toml"
+    return ["sh", "-c", f"{limit}exec {build}"]
+
+
+def environment(cache):
+    path = os.pathsep.join((str(ROOT), str(ROOT / "model")))
+    return os.environ | {"PYTHONPATH": path, "SUPERVESSEL_CACHE": str(cache)}
+
+
+@needs_posix
+def test_an_interrupt_keeps_whole_results_and_leaves_no_fmu(tmp_path, cache):
+    """Signals are sent until one is heard, as somebody at a keyboard would."""
+    (tmp_path / "ball.toml").write_text(TEXT)
+    folder = Path(cache) / "accuracy"
+    before = set(folder.glob("*"))
+    running = subprocess.Popen(
+        command(),
+        cwd=tmp_path,
+        env=environment(cache),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    while running.poll() is None and not set(folder.glob("*.json")) - before:
+        time.sleep(0.02)
+    while running.poll() is None:  # libraries that equations are made with lose some
+        running.send_signal(signal.SIGINT)
+        with suppress(subprocess.TimeoutExpired):
+            running.wait(10.0)
+    out, error = running.communicate()
+    assert (running.returncode, out, error) == (1, "", "interrupted; no FMU was written\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["ball.toml"]
+    kept = {path: path.read_bytes() for path in set(folder.glob("*")) - before}
+    assert kept
+    assert all(json.loads(content)["refused"] is None for content in kept.values())
+    done = subprocess.run(
+        command(), cwd=tmp_path, env=environment(cache), capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.splitlines()[1] == "ball.fmu"
+    assert {path: path.read_bytes() for path in kept} == kept
+
+
+@needs_posix
+def test_a_full_disk_is_said_and_leaves_nothing_half_written(tmp_path, cache):
+    """The room suffices for no history of inputs."""
+    (tmp_path / "ball.toml").write_text(TEXT.replace("horizon = 50.0", "horizon = 51.0"))
+    done = subprocess.run(
+        command("ulimit -f 1; "),
+        cwd=tmp_path,
+        env=environment(cache),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "Traceback" not in done.stderr
+    assert done.stderr.strip()
+    assert [path.name for path in tmp_path.iterdir()] == ["ball.toml"]
+
+
+def test_a_trade_takes_the_scene_without_what_it_asks():
+    scene = parse_scene(SCENE)
+    made = variant_of(scene, Choice(Model("principal"), "rk4", 0.1))
+    assert made.accuracy is None
+    assert (made.rotation.law, made.rotation.propagator, made.rotation.max_angle_step) == (
+        "principal",
+        "rk4",
+        0.1,
+    )
+    assert without_accuracy(scene).is_chosen
