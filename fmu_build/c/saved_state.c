@@ -38,6 +38,9 @@ Status saved_state_restore(Instance *instance, const void *saved) {
     if (dynamics->model_exchange != instance->now.model_exchange)
         return instance_error(instance, "the FMU state is one of %s, this instance is not",
                               dynamics->model_exchange ? "model exchange" : "co-simulation");
+    if (dynamics->state == EVENT && !dynamics->model_exchange && !instance->event_mode_used)
+        return instance_error(instance, "the FMU state is one in event mode, and eventModeUsed was false when this "
+                                        "instance was made");
     memcpy(&instance->now, saved, sizeof(Dynamics));
     instance_state_moved(instance);
     return STATUS_OK;

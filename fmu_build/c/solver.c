@@ -70,6 +70,8 @@ typedef struct {
     int exponent;        /* power of a sub-step that its estimated error grows with, once next_size is known */
 #if STEPS == STEPS_BY_SERIES
     double acceleration[3]; /* rad/s2, by the torque, once next_size is known */
+    double rest[3];         /* rad/s, what rounding has kept from the angular velocity */
+    double drift;           /* rad, what other rounding of the angular velocity comes to at the step's end; in error */
 #endif
     bool composite_changed; /* since the last communication step */
     bool was_free;
@@ -129,7 +131,7 @@ static Status sub_step(Instance *instance, Progress *progress) {
 
 /* Of the series: what costs least, see supervessel/propagators/taylor.py. */
 static int series_order(double tolerance) {
-    const int order = 2 * (int)floor(2.5 - 0.29 * log(tolerance));
+    const int order = 2 * (int)floor(2.75 - 0.29 * log(tolerance));
     return order < TAYLOR_LEAST_ORDER ? TAYLOR_LEAST_ORDER : order > TAYLOR_MOST_ORDER ? TAYLOR_MOST_ORDER : order;
 }
 
@@ -193,6 +195,13 @@ static const double LONGEST_SHARE = 1.2;
 /* What of the error allowed a sub-step aims at: the estimate at another size than the series' is itself estimated. */
 static const double AIM = 0.8;
 
+/* What the error `found` at the communication step's end is where a sub-step's errors of attitude and rate, the larger
+   of the two by its own size, are no more than rounding. */
+static double rounding_of(double found, const double error[2], double speed) {
+    const double worst = larger(error[0], error[1] / speed);
+    return worst > 0.0 ? HALF_ULP * (found / worst) : 0.0;
+}
+
 static void begin_series(Instance *instance, Progress *progress) {
     composite_refresh_axes(instance);
     progress->exponent = series_order(instance->now.tolerance) + 1;
@@ -204,8 +213,8 @@ static void begin_series(Instance *instance, Progress *progress) {
 }
 
 /* Takes one sub-step whose estimated error, as it shows at the communication step's end, stays within its share of the
-   tolerance by time, or within what rounding amounts to there. Series hold for any time: they are summed up at that
-   which the error allows, and no sub-step is taken again but for lack of finite numbers. */
+   tolerance by time, or within rounding. Series hold for any time: they are summed up at that which the error allows,
+   and no sub-step is taken again but for lack of finite numbers. */
 static Status sub_step(Instance *instance, Progress *progress) {
     if (progress->next_size == 0.0) begin_series(instance, progress);
     const double *x = instance_x(instance), *map = &instance->now.a[AXES_SERIES];
@@ -220,19 +229,25 @@ static Status sub_step(Instance *instance, Progress *progress) {
         const double speed = length_of(series.rates[0]) + length_of(series.rates[1]);
         const double left = larger(progress->remaining, speed > 0.0 ? 1.0 / speed : 0.0);
         const double reach = smaller(left, TURNED_ON / speed + TURNED_ON_SHARE * left);
-        const double rounding = HALF_ULP * (1.0 + speed * reach);
-        const double allowed = larger(SAFETY * instance->now.tolerance * (size / progress->h), rounding);
         const double found = series.error[0] + series.error[1] * reach;
+        const double rounding = rounding_of(found, series.error, speed);
+        const double allowed = larger(SAFETY * instance->now.tolerance * (size / progress->h), rounding);
         const double best = found > 0.0 ? pow(AIM * allowed / found, 1.0 / series.order) : 5.0;
         double taken = size, next[STATE_COUNT];
         if (!(found <= allowed)) taken = without_rest(progress, best * size);
         else if (best > 1.0 && 2.0 * LONGEST_SHARE * size < progress->remaining)
             taken = without_rest(progress, smaller(best, LONGEST_SHARE) * size);
         const double share = taken / size;
-        taylor_sum(&series, x, map, share, next);
+        double rest[3];
+        memcpy(rest, progress->rest, sizeof rest);
+        taylor_sum(&series, x, map, share, next, rest);
         if (isfinite(found) && is_finite(next)) {
             const double error = share == 1.0 ? found : AIM * allowed * share;
-            go_on(instance, progress, next, taken, error + HALF_ULP * (1.0 + speed * size));
+            const double turned_on = 2.0 * HALF_ULP * speed * progress->remaining; /* adds up as a random walk does */
+            const double drift = sqrt(progress->drift * progress->drift + turned_on * turned_on);
+            memcpy(progress->rest, rest, sizeof rest);
+            go_on(instance, progress, next, taken, error + HALF_ULP * (1.0 + speed * size) + (drift - progress->drift));
+            progress->drift = drift;
             progress->next_size = size * smaller(best, 5.0);
             return STATUS_OK;
         }

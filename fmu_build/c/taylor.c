@@ -12,7 +12,8 @@ enum { WIDTH = 7 };
 enum { WIDTH = 10 };
 #endif
 
-/* What the products take of a coefficient: seven of the turn or the rates, see _turn in taylor.py, then the rates. */
+/* What the products take of a coefficient: seven of the turn or the rates, see _turn in taylor.py, then the rates, in
+   an order that lets compilers take all by twos. */
 typedef struct {
     double of[WIDTH];
 } Row;
@@ -21,11 +22,8 @@ static double remainder_of(double before, double after) {
     return after / sqrt(before > 0.0 ? before : 1.0);
 }
 
-void add_products(const Row *one, const Row *other, int count, double sums[WIDTH]);
-
-/* sums: of products, element by element, of rows from `one` on and rows from `other` back. Not static: a compiler that
-   mixes this loop with what follows no longer takes two elements at a time. */
-void add_products(const Row *one, const Row *other, int count, double sums[WIDTH]) {
+/* sums: of products, element by element, of rows from `one` on and rows from `other` back. */
+static void add_products(const Row *one, const Row *other, int count, double sums[WIDTH]) {
     double s[WIDTH] = {0.0};
     for (int j = 0; j < count; j++)
         for (int i = 0; i < WIDTH; i++) s[i] += one[j].of[i] * other[-j].of[i];
@@ -78,9 +76,9 @@ static void spread(const double turn[4], const double rate[3], double step, doub
     other[5] = -step * rate[2];
     other[6] = -step * rate[0];
 #if PRODUCT_COUNT > 0
-    one[7] = other[9] = rate[1];
-    one[8] = other[7] = rate[2];
-    one[9] = other[8] = rate[0];
+    one[8] = other[7] = rate[1];
+    one[9] = other[8] = rate[2];
+    one[7] = other[9] = rate[0];
 #endif
 }
 
@@ -125,9 +123,9 @@ void taylor_series(const double x[7], const double acceleration[3], const double
         next[2] = scale * ((((f + g) + s[5]) + half * v[1]) + ((p[0] * Y + p[3] * X) - p[1] * Z));
         next[3] = scale * ((((f - g) + s[6]) + half * v[2]) + ((p[0] * Z + p[1] * Y) - p[2] * X));
 #if PRODUCT_COUNT > 0
-        rate[0] = (scale * pull[0]) * (s[7] + (w[1] * v[2] + v[1] * w[2]));
-        rate[1] = (scale * pull[1]) * (s[8] + (w[2] * v[0] + v[2] * w[0]));
-        rate[2] = (scale * pull[2]) * (s[9] + (w[0] * v[1] + v[0] * w[1]));
+        rate[0] = (scale * pull[0]) * (s[8] + (w[1] * v[2] + v[1] * w[2]));
+        rate[1] = (scale * pull[1]) * (s[9] + (w[2] * v[0] + v[2] * w[0]));
+        rate[2] = (scale * pull[2]) * (s[7] + (w[0] * v[1] + v[0] * w[1]));
 #else
         rate[0] = rate[1] = rate[2] = 0.0;
 #endif
@@ -136,7 +134,8 @@ void taylor_series(const double x[7], const double acceleration[3], const double
     estimate(series);
 }
 
-void taylor_sum(const Series *series, const double x[7], const double map[], double share, double next[7]) {
+void taylor_sum(const Series *series, const double x[7], const double map[], double share, double next[7],
+                double rest[3]) {
     double turned[2][4] = {{0.0}}, gained[2][3] = {{0.0}}, axis[3], gain[3];
     const double square = share * share;
     for (int k = series->order; k > 0; k -= 2) { /* the smallest first */
@@ -158,7 +157,11 @@ void taylor_sum(const Series *series, const double x[7], const double map[], dou
     };
     const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     for (int i = 0; i < 4; i++) next[i] = q[i] / length;
-    for (int i = 0; i < 3; i++) next[4 + i] = x[4 + i] + gain[i];
+    for (int i = 0; i < 3; i++) { /* Knuth's sum: next and rest together are exact */
+        const double added = gain[i] + rest[i], sum = x[4 + i] + added, back = sum - x[4 + i];
+        rest[i] = (x[4 + i] - (sum - back)) + (added - back);
+        next[4 + i] = sum;
+    }
 }
 
 #else

@@ -22,7 +22,10 @@ typedef struct {
    step         : [s] */
 void taylor_series(const double x[7], const double acceleration[3], const double map[], double step, Series *series);
 
-/* Sums the series up, at s = share, to the state next. */
-void taylor_sum(const Series *series, const double x[7], const double map[], double share, double next[7]);
+/* Sums the series up, at s = share, to the state next.
+   rest : what rounding kept from the angular velocity before, and then keeps from it [rad/s]: over many sub-steps a
+          nearly steady gain would be rounded to the same side */
+void taylor_sum(const Series *series, const double x[7], const double map[], double share, double next[7],
+                double rest[3]);
 
 #endif

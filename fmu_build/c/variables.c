@@ -123,7 +123,7 @@ static Status check_settable(Instance *instance, const Variable *variable) {
                                   variable->name);
         case ROLE_OUTPUT: return instance_error(instance, "%s is an output and cannot be set", variable->name);
         case ROLE_STATE: /* beside SetContinuousStates: CasADi's importer sets states by reference */
-            if (instance->now.state & (EVENT | CONTINUOUS)) return STATUS_OK;
+            if (instance->now.model_exchange && (instance->now.state & (EVENT | CONTINUOUS))) return STATUS_OK;
             return instance_error(instance, "%s is a state: it can be set in model exchange once it runs",
                                   variable->name);
         case ROLE_DERIVATIVE:

@@ -90,13 +90,27 @@ def _decoupled(numbers: ca.SX, omega: ca.SX, torque: ca.SX) -> ca.SX:
     return torque * numbers
 
 
+def _scale(inertia: ca.SX) -> ca.SX:
+    """Returns a power of two that brings the largest moment to between 3/4 and 3.
+
+    So scaled, moments times rates neither over- nor underflow before the rates do, and no other bit changes.
+    Two moments' mean is at least half of the third, and no larger than a double. Less 2^-52 of itself it is
+    one or two units in its last place smaller.
+    """
+    mean = 0.5 * inertia[0, 0] + 0.5 * inertia[1, 1]
+    unit = mean - (1.0 - 2.0**-52) * mean
+    return 2.0**-52 / unit
+
+
 def _moments(inertia: ca.SX) -> ca.SX:
-    return ca.vertcat(ca.diag(inertia), 1.0 / ca.diag(inertia))
+    scale = _scale(inertia)
+    moments = scale * ca.diag(inertia)
+    return ca.vertcat(moments, 1.0 / moments, scale)
 
 
 def _principal(numbers: ca.SX, omega: ca.SX, torque: ca.SX) -> ca.SX:
     """[CV] eq. (2): Euler's equations with the diagonal of the tensor only."""
-    J, reciprocal = numbers[:3], numbers[3:]
+    J, reciprocal, torque = numbers[:3], numbers[3:6], numbers[6] * torque
     return ca.vertcat(
         (torque[0] - (J[2] - J[1]) * omega[1] * omega[2]) * reciprocal[0],
         (torque[1] - (J[0] - J[2]) * omega[2] * omega[0]) * reciprocal[1],
@@ -106,12 +120,14 @@ def _principal(numbers: ca.SX, omega: ca.SX, torque: ca.SX) -> ca.SX:
 
 def _principal_products(numbers: ca.SX) -> ca.SX:
     """Returns the diagonal of (J_j - J_k)/J_i, (3, 3)."""
-    J, reciprocal = numbers[:3], numbers[3:]
+    J, reciprocal = numbers[:3], numbers[3:6]
     return ca.diag(ca.vertcat(J[1] - J[2], J[2] - J[0], J[0] - J[1]) * reciprocal)
 
 
 def _tensor_and_inverse(inertia: ca.SX) -> ca.SX:
-    return ca.vertcat(upper_triangle(inertia), upper_triangle(ldl_inverse(*ldl(inertia))))
+    scale = _scale(inertia)
+    scaled = scale * inertia
+    return ca.vertcat(upper_triangle(scaled), upper_triangle(ldl_inverse(*ldl(scaled))), scale)
 
 
 def _tensor(numbers: ca.SX, omega: ca.SX, torque: ca.SX) -> ca.SX:
@@ -120,8 +136,8 @@ def _tensor(numbers: ca.SX, omega: ca.SX, torque: ca.SX) -> ca.SX:
     Multiplying by the inverse takes as many operations as solving with the factors, but none of them
     waits for another: half the time of a step.
     """
-    J, inverse = from_upper_triangle(numbers[:6]), from_upper_triangle(numbers[6:])
-    return inverse @ (torque - ca.cross(omega, J @ omega))
+    J, inverse = from_upper_triangle(numbers[:6]), from_upper_triangle(numbers[6:12])
+    return inverse @ (numbers[12] * torque - ca.cross(omega, J @ omega))
 
 
 def _tensor_products(numbers: ca.SX) -> ca.SX:
@@ -129,7 +145,7 @@ def _tensor_products(numbers: ca.SX) -> ca.SX:
 
     Written out, the moments occur as differences only: a nearly spherical body loses no digits.
     """
-    J, inverse = from_upper_triangle(numbers[:6]), from_upper_triangle(numbers[6:])
+    J, inverse = from_upper_triangle(numbers[:6]), from_upper_triangle(numbers[6:12])
     xy, xz, yz = J[0, 1], J[0, 2], J[1, 2]
     rows = (
         (J[1, 1] - J[2, 2], xy, -xz, 0.0, -yz, yz),

@@ -296,3 +296,25 @@ def test_fmpy_flies_a_ship_that_leaves_and_comes_back(fmi, kind, events):
     for time, docked, mass in zip(*(result[name] for name in ("time", "berth.docked", "mass")), strict=True):
         if not np.any(np.isclose(time, (0.5, 1.0), rtol=0.0, atol=1e-9)):
             assert (docked, mass) == ((not 0.5 < time < 1.0), ISS + (not 0.5 < time < 1.0) * DG), time
+
+
+def test_a_state_cannot_be_set_in_event_mode_of_co_simulation():
+    instance = brought(3, "events, event")
+    assert instance.set({"state.angular_velocity[1]": 0.5}) == ERROR
+    assert instance.messages() == [
+        "fmi3SetFloat64: state.angular_velocity[1] is a state: it can be set in model exchange once it runs"
+    ]
+    instance.free()
+
+
+def test_a_state_saved_in_event_mode_is_refused_where_there_is_none():
+    instance, other = brought(3, "events, event"), brought(3, "cs, stepping")
+    saved = instance.fmu.getFMUState()
+    assert other._status(other.fmu.setFMUState, saved) == ERROR
+    assert other.messages() == [
+        "fmi3SetFMUState: the FMU state is one in event mode, and eventModeUsed was false when this "
+        "instance was made"
+    ]
+    instance.fmu.freeFMUState(saved)
+    instance.free()
+    other.free()

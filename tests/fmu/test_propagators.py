@@ -797,6 +797,24 @@ def test_controlled_steps_return_early_when_asked(propagator, at):
     listener.free()
 
 
+@pytest.mark.parametrize("propagator", ["taylor", "auto"])
+@pytest.mark.parametrize(
+    ("tolerance", "reached", "most"), [(1e-5, 1e-6, 49), (1e-9, 1e-9, 63), (1e-12, 1e-12, 66)]
+)
+def test_constant_torque_takes_few_sub_steps(propagator, tolerance, reached, most):
+    """36 rad in 40 s. The numbers are those measured, and a few more; `make bench` tells the time."""
+    torque, span = (0.01, -0.02, 0.015), 40.0
+    rates = [0.3, 0.7, 0.5]
+    raw = body(1.0, (1.0, 2.0, 3.0), propagator=propagator, tolerance=tolerance, angular_velocity=rates)
+    listener = Listener(raw)
+    x, J = state(listener), listener.get("inertia")
+    assert listener.set({"torque": torque}) == OK
+    assert listener.go(span) == (OK, False, span)
+    assert error(state(listener), ("tensor", J), x, torque, span).max() <= reached
+    assert len(listener.times) <= most
+    listener.free()
+
+
 # Steps that a method cannot take.
 
 

@@ -39,9 +39,10 @@
 
 enum { OK, WARNING, DISCARD, ERROR, NOT_CALLED };
 enum { INSTANTIATED = 1, INITIALIZATION = 2, STEPPING = 4, EVENT = 8, CONTINUOUS = 16, TERMINATED = 32, ALL = 63 };
+enum { NO_STEPS = 64 }; /* of model exchange only */
 enum { BEFORE_START = INSTANTIATED | INITIALIZATION, EXCHANGING = EVENT | CONTINUOUS, RUNNING = STEPPING | EXCHANGING };
 enum { SLOTS = 6, SAVED = 3, BLOBS = 4, MOST = 12, PATIENCE = 60 };
-enum { INPUT_COUNT = INPUT_P_COUNT + INPUT_U_COUNT };
+enum { INPUT_COUNT = INPUT_P_COUNT + INPUT_K_COUNT + INPUT_U_COUNT, HAS_EVENT_MODE = FMI == 3 && DOCKED_COUNT > 0 };
 
 static const double UNIT_TOLERANCE = 8.0 * DBL_EPSILON; /* 2 EPSILON a component, and the norm's own rounding */
 
@@ -57,7 +58,7 @@ typedef struct {
 
 typedef struct {
     void *component; /* NULL: none */
-    bool exchange, early_allowed, listens, has_log;
+    bool exchange, events, early_allowed, listens, has_log; /* events: co-simulation with event mode */
     unsigned log_mask; /* 1: discarded, 2: errors */
     Known now, known[SAVED];
     void *saved[SAVED], *before;
@@ -88,10 +89,11 @@ static unsigned long long seed, call_count;
 static unsigned long answered[4], steps_taken;
 static uint64_t random_state, digest = UINT64_C(14695981039346656037);
 static unsigned attitude_reference;
+static char last_line[1024]; /* logged */
 
 static void fail(const char *rule, const Slot *slot, int status) {
-    fprintf(stderr, "seed %llu, call %llu, %s in state %u of %s answered %d: %s\n", seed, call_count, called,
-            slot->now.state, slot->exchange ? "model exchange" : "co-simulation", status, rule);
+    fprintf(stderr, "seed %llu, call %llu, %s in state %u of %s answered %d: %s; logged last: %s\n", seed, call_count,
+            called, slot->now.state, slot->exchange ? "model exchange" : "co-simulation", status, rule, last_line);
     exit(1);
 }
 
@@ -147,14 +149,25 @@ static double value_for(unsigned reference) {
     return variable->start == 0.0 ? uniform(0.0, 0.1) : variable->start * uniform(0.95, 1.05);
 }
 
+static bool is_boolean(unsigned reference) {
+#if DOCKED_COUNT
+    return reference < VARIABLE_COUNT && VARIABLES[reference].type == TYPE_BOOLEAN;
+#else
+    (void)reference;
+    return false;
+#endif
+}
+
+/* Of a number. */
 static unsigned reference_of(Role role) {
     unsigned reference = below(VARIABLE_COUNT);
-    while (VARIABLES[reference].role != role) reference = (reference + 1) % VARIABLE_COUNT;
+    while (VARIABLES[reference].role != role || is_boolean(reference)) reference = (reference + 1) % VARIABLE_COUNT;
     return reference;
 }
 
 static unsigned any_reference(void) {
-    if (!once_in(150)) return below(VARIABLE_COUNT);
+    const unsigned reference = below(VARIABLE_COUNT);
+    if (!once_in(150)) return is_boolean(reference) && !once_in(20) ? (unsigned)REFERENCE_TIME : reference;
     return once_in(2) ? (unsigned)VARIABLE_COUNT : once_in(2) ? UINT_MAX : (unsigned)draw();
 }
 
@@ -183,6 +196,7 @@ static void logged(Slot *slot, int status, const char *category, const char *mes
     const size_t length = strlen(called);
     slot->lines++;
     slot->line_status = status;
+    snprintf(last_line, sizeof last_line, "%s", message);
     slot->line_named = strncmp(message, called, length) == 0 && message[length] == ':' && strlen(message) < 1024 &&
                        strcmp(category, status == ERROR ? "logStatusError" : "logStatusDiscard") == 0;
 }
@@ -221,6 +235,33 @@ static int set_values(Slot *slot, const unsigned references[], size_t count, con
     return (int)fmi2SetReal(slot->component, references, count, values);
 #endif
 }
+
+#if DOCKED_COUNT
+
+typedef EITHER(fmi2Boolean, fmi3Boolean) Boolean;
+
+static int get_booleans(Slot *slot, const unsigned references[], size_t count, Boolean values[], size_t value_count) {
+    called = EITHER("fmi2GetBoolean", "fmi3GetBoolean");
+    (void)value_count;
+#if FMI == 3
+    return (int)fmi3GetBoolean(slot->component, references, count, values, value_count);
+#else
+    return (int)fmi2GetBoolean(slot->component, references, count, values);
+#endif
+}
+
+static int set_booleans(Slot *slot, const unsigned references[], size_t count, const Boolean values[],
+                        size_t value_count) {
+    called = EITHER("fmi2SetBoolean", "fmi3SetBoolean");
+    (void)value_count;
+#if FMI == 3
+    return (int)fmi3SetBoolean(slot->component, references, count, values, value_count);
+#else
+    return (int)fmi2SetBoolean(slot->component, references, count, values);
+#endif
+}
+
+#endif
 
 static int save(Slot *slot, void **saved) {
     called = EITHER("fmi2GetFMUstate", "fmi3GetFMUState");
@@ -317,14 +358,15 @@ static bool instantiate(Slot *slot, const char *name, const char *token, bool lo
     const unsigned required[2] = {REFERENCE_OUTPUTS, once_in(20) ? any_reference() : attitude_reference};
     const size_t count = below(3);
     const bool output = count < 2 || (required[1] < VARIABLE_COUNT && VARIABLES[required[1]].role == ROLE_OUTPUT);
-    const bool event_mode = once_in(40), null = once_in(40);
+    const bool event_mode = once_in(HAS_EVENT_MODE ? 2 : 40), null = once_in(40);
+    slot->events = event_mode;
     slot->early_allowed = once_in(2);
     slot->listens = once_in(2);
     called = "fmi3InstantiateCoSimulation";
     slot->component = fmi3InstantiateCoSimulation(name, token, NULL, false, log_on, event_mode, slot->early_allowed,
                                                   null ? NULL : required, count, slot, log,
                                                   slot->listens ? updated : NULL);
-    return !event_mode && output && (!null || count == 0);
+    return (!event_mode || HAS_EVENT_MODE) && output && (!null || count == 0);
 }
 #else
 static bool instantiate(Slot *slot, const char *name, const char *token, bool log_on) {
@@ -394,7 +436,7 @@ static Answer leave(Slot *slot) {
     called = EITHER("fmi2ExitInitializationMode", "fmi3ExitInitializationMode");
     Answer answer = {OK, expect(slot, INITIALIZATION, true)};
     answer.status = (int)EITHER(fmi2ExitInitializationMode, fmi3ExitInitializationMode)(slot->component);
-    if (answer.status == OK) slot->now.state = slot->exchange ? EVENT : STEPPING;
+    if (answer.status == OK) slot->now.state = slot->exchange || slot->events ? EVENT : STEPPING;
     return answer;
 }
 
@@ -445,7 +487,7 @@ static Answer get(Slot *slot) {
     bool right = value_count == count;
     for (size_t i = 0; i < count; i++) {
         references[i] = any_reference();
-        right = right && references[i] < VARIABLE_COUNT;
+        right = right && references[i] < VARIABLE_COUNT && !is_boolean(references[i]);
     }
     const bool no_references = once_in(60), no_values = once_in(60);
     right = right && (count == 0 || !(no_references || no_values));
@@ -459,11 +501,11 @@ static Answer get(Slot *slot) {
 }
 
 static bool settable(const Slot *slot, unsigned reference) {
-    if (reference >= VARIABLE_COUNT) return false;
+    if (reference >= VARIABLE_COUNT || is_boolean(reference)) return false;
     switch (VARIABLES[reference].role) {
         case ROLE_INPUT: return true;
         case ROLE_PARAMETER: return (slot->now.state & BEFORE_START) != 0;
-        case ROLE_STATE: return (slot->now.state & EXCHANGING) != 0;
+        case ROLE_STATE: return slot->exchange && (slot->now.state & EXCHANGING) != 0;
         default: return false;
     }
 }
@@ -471,7 +513,7 @@ static bool settable(const Slot *slot, unsigned reference) {
 static unsigned reference_to_set(const Slot *slot) {
     if (once_in(150)) return any_reference();
     if ((slot->now.state & BEFORE_START) && once_in(2)) return reference_of(ROLE_PARAMETER);
-    if ((slot->now.state & EXCHANGING) && once_in(3)) return reference_of(ROLE_STATE);
+    if (slot->exchange && (slot->now.state & EXCHANGING) && once_in(3)) return reference_of(ROLE_STATE);
     return reference_of(ROLE_INPUT);
 }
 
@@ -510,14 +552,82 @@ static Answer set(Slot *slot) {
 static Answer set_good_inputs(Slot *slot) {
     unsigned references[INPUT_COUNT + 1];
     double values[INPUT_COUNT + 1];
-    for (unsigned i = 0; i < INPUT_COUNT; i++) {
-        references[i] = REFERENCE_P + i;
-        values[i] = VARIABLES[references[i]].start * uniform(0.99, 1.01);
+    size_t count = 0;
+    for (unsigned i = REFERENCE_P; i < REFERENCE_P + INPUT_COUNT; i++) {
+        if (is_boolean(i)) continue;
+        references[count] = i;
+        values[count++] = VARIABLES[i].start * uniform(0.99, 1.01);
     }
     Answer answer = {OK, slot->now.state & (BEFORE_START | RUNNING) ? FINE : AN_ERROR};
-    answer.status = set_values(slot, references, INPUT_COUNT, values, INPUT_COUNT);
+    answer.status = set_values(slot, references, count, values, count);
     return answer;
 }
+
+#if DOCKED_COUNT
+
+static unsigned boolean_reference(void) {
+    unsigned reference = below(VARIABLE_COUNT);
+    if (once_in(100)) return any_reference();
+    while (!is_boolean(reference)) reference = (reference + 1) % VARIABLE_COUNT;
+    return reference;
+}
+
+static Answer get_some_booleans(Slot *slot) {
+    const size_t count = below(4), value_count = FMI == 3 && once_in(40) ? count + 1 : count;
+    unsigned *references = array(count, sizeof *references);
+    Boolean *values = array(count, sizeof *values);
+    bool right = value_count == count;
+    for (size_t i = 0; i < count; i++) {
+        references[i] = boolean_reference();
+        right = right && is_boolean(references[i]);
+    }
+    const bool null = once_in(60);
+    right = right && (count == 0 || !null);
+    Answer answer = {OK, expect(slot, FMI == 3 ? ALL : ALL & ~INSTANTIATED, right)};
+    if (answer.expected != AN_ERROR) answer.expected = FINE;
+    answer.status = get_booleans(slot, references, count, null ? NULL : values, value_count);
+    for (size_t i = 0; i < count && answer.status == OK; i++) {
+        const double value = values[i] ? 1.0 : 0.0;
+        note_values(&value, 1);
+    }
+    free(references);
+    free(values);
+    return answer;
+}
+
+/* Opens and closes docks; where that has to wait for an event, mostly sets what is. */
+static Answer set_some_booleans(Slot *slot) {
+    const size_t count = below(3), value_count = FMI == 3 && once_in(60) ? count + 1 : count;
+    const bool held = (slot->now.state & (slot->events ? STEPPING | CONTINUOUS : CONTINUOUS)) != 0;
+    const bool null = once_in(60), keep = held && !once_in(10);
+    unsigned *references = array(count, sizeof *references);
+    Boolean *values = array(count, sizeof *values), back = 0;
+    bool right = value_count == count && (count == 0 || !null);
+    for (size_t i = 0; i < count; i++) {
+        references[i] = boolean_reference();
+        right = right && is_boolean(references[i]);
+        if (!right) continue;
+        values[i] = once_in(3) ? VARIABLES[references[i]].start == 0.0 : VARIABLES[references[i]].start != 0.0;
+        if (!held) continue;
+        if (get_booleans(slot, &references[i], 1, &back, 1) != OK) fail("a Boolean cannot be read", slot, ERROR);
+        if (keep) values[i] = back;
+        right = right && !values[i] == !back;
+    }
+    Answer answer = {OK, expect(slot, BEFORE_START | RUNNING, right)};
+    if (answer.expected != AN_ERROR) answer.expected = FINE;
+    answer.status = set_booleans(slot, references, count, null ? NULL : values, value_count);
+    if (answer.status == OK && count > 0 && (FMI == 3 || slot->now.state != INSTANTIATED)) {
+        const char *name = called;
+        if (get_booleans(slot, &references[count - 1], 1, &back, 1) != OK || !back != !values[count - 1])
+            fail("a Boolean that was set does not read back", slot, OK);
+        called = name;
+    }
+    free(references);
+    free(values);
+    return answer;
+}
+
+#endif
 
 /* Steps. */
 
@@ -594,7 +704,7 @@ static unsigned known_reference(const Slot *slot) {
 
 static bool differentiable(const Slot *slot, unsigned reference, bool unknown) {
     const bool before = (slot->now.state & BEFORE_START) != 0;
-    if (reference >= VARIABLE_COUNT) return false;
+    if (reference >= VARIABLE_COUNT || is_boolean(reference)) return false;
     switch (VARIABLES[reference].role) {
         case ROLE_TIME:
         case ROLE_INPUT: return !unknown;
@@ -683,10 +793,10 @@ static Answer output_derivative(Slot *slot) {
 static Answer set_time(Slot *slot) {
     const double time = once_in(30) ? no_number() : slot->now.time + uniform(-1.0, 1.0);
     called = EITHER("fmi2SetTime", "fmi3SetTime");
-    Answer answer = {OK, expect(slot, EXCHANGING, true)};
+    Answer answer = {OK, expect_of(slot, true, EXCHANGING, true)};
     answer.status = (int)EITHER(fmi2SetTime, fmi3SetTime)(slot->component, time);
     if (answer.status == OK) slot->now.time = time;
-    if ((answer.status == OK) != ((slot->now.state & EXCHANGING) && isfinite(time)))
+    if ((answer.status == OK) != (slot->exchange && (slot->now.state & EXCHANGING) && isfinite(time)))
         fail("time is set if and only if it is finite", slot, answer.status);
     return answer;
 }
@@ -768,17 +878,34 @@ static Answer update_discrete_states(Slot *slot) {
     return answer;
 }
 
+#if FMI == 3 && DOCKED_COUNT
+static Answer step_mode(Slot *slot) {
+    Answer answer = {OK, expect_of(slot, false, EVENT, true)};
+    called = "fmi3EnterStepMode";
+    answer.status = (int)fmi3EnterStepMode(slot->component);
+    if (answer.status == OK) slot->now.state = STEPPING;
+    return answer;
+}
+#endif
+
 static Answer change_mode(Slot *slot) {
     Answer answer = {OK, ANYTHING};
-    if (once_in(2)) {
+    const unsigned before_event = EITHER(EXCHANGING, CONTINUOUS) | (slot->events ? STEPPING : 0);
+    const bool wants_event = slot->exchange ? once_in(2) : slot->now.state != EVENT;
+    if (!slot->exchange && !slot->events && !once_in(50)) return NOTHING;
+#if FMI == 3 && DOCKED_COUNT
+    if (slot->events && slot->now.state == EVENT ? !once_in(50) : once_in(50)) return step_mode(slot);
+    if (slot->events && slot->now.state == STEPPING && !once_in(8)) return NOTHING;
+#endif
+    if (wants_event) {
         called = EITHER("fmi2EnterEventMode", "fmi3EnterEventMode");
-        answer.expected = slot->now.state & EITHER(EXCHANGING, CONTINUOUS) ? FINE : AN_ERROR;
+        answer.expected = slot->now.state & before_event ? FINE : AN_ERROR;
         answer.status = (int)EITHER(fmi2EnterEventMode, fmi3EnterEventMode)(slot->component);
         if (answer.status == OK) slot->now.state = EVENT;
         return answer;
     }
     called = EITHER("fmi2EnterContinuousTimeMode", "fmi3EnterContinuousTimeMode");
-    answer.expected = slot->now.state != EVENT ? AN_ERROR : !CHANGES ? FINE : EITHER(ANYTHING, NO_ERROR);
+    answer.expected = slot->now.state != EVENT || !slot->exchange ? AN_ERROR : !CHANGES ? FINE : EITHER(ANYTHING, NO_ERROR);
     answer.status = (int)EITHER(fmi2EnterContinuousTimeMode, fmi3EnterContinuousTimeMode)(slot->component);
     if (answer.status == OK) slot->now.state = CONTINUOUS;
     return answer;
@@ -807,7 +934,9 @@ static Answer save_some(Slot *slot) {
 static Answer restore_some(Slot *slot) {
     const unsigned k = below(SAVED);
     if (!slot->saved[k] && !once_in(20)) return NOTHING;
-    const Answer answer = {restore(slot, slot->saved[k]), slot->saved[k] ? FINE : AN_ERROR};
+    const bool in_event = slot->saved[k] && slot->known[k].state == EVENT;
+    const bool right = slot->saved[k] && (!in_event || slot->exchange || slot->events);
+    const Answer answer = {restore(slot, slot->saved[k]), right ? FINE : AN_ERROR};
     if (answer.status == OK) slot->now = slot->known[k];
     return answer;
 }
@@ -888,14 +1017,20 @@ static Answer deserialize(Slot *slot) {
 
 /* Functions of what the FMU does not have; all in this version's header that are not called above. */
 
+#if DOCKED_COUNT
+#define BOOLEAN(X)
+#else
+#define BOOLEAN(X) X(Boolean)
+#endif
+
 #if FMI == 3
 #define OTHER_TYPES(X) \
-    X(Float32) X(Int8) X(UInt8) X(Int16) X(UInt16) X(Int32) X(UInt32) X(Int64) X(UInt64) X(Boolean) X(String)
+    X(Float32) X(Int8) X(UInt8) X(Int16) X(UInt16) X(Int32) X(UInt32) X(Int64) X(UInt64) BOOLEAN(X) X(String)
 #define PREFIXED(NAME) fmi3##NAME
 #define TEXT(NAME) "fmi3" #NAME
 #define SIZES_OF(count) , count
 #else
-#define OTHER_TYPES(X) X(Integer) X(Boolean) X(String)
+#define OTHER_TYPES(X) X(Integer) BOOLEAN(X) X(String)
 #define PREFIXED(NAME) fmi2##NAME
 #define TEXT(NAME) "fmi2" #NAME
 #define SIZES_OF(count)
@@ -946,7 +1081,9 @@ static Answer unsupported(Slot *slot) {
     CALL(SetShiftDecimal, (component, NULL, 1, NULL))
     CALL(SetShiftFraction, (component, NULL, 1, NULL, NULL))
     CALL(EvaluateDiscreteStates, (component))
+#if !DOCKED_COUNT
     CALL(EnterStepMode, (component))
+#endif
     CALL(ActivateModelPartition, (component, 0, 0.0))
     CALL(GetBinary, (component, NULL, 1, NULL, NULL, 1))
     CALL(SetBinary, (component, NULL, 1, NULL, NULL, 1))
@@ -998,6 +1135,13 @@ static bool comparable(const Slot *slot, unsigned state, int status, unsigned re
 static void read_all(Slot *slot, unsigned state, int status, double values[]) {
     for (unsigned i = 0; i < VARIABLE_COUNT; i++) {
         values[i] = 0.0;
+#if DOCKED_COUNT
+        Boolean value = 0;
+        if (is_boolean(i)) {
+            values[i] = get_booleans(slot, &i, 1, &value, 1) != OK ? -12345.0 : value ? 1.0 : 0.0;
+            continue;
+        }
+#endif
         if (comparable(slot, state, status, i) && get_values(slot, &i, 1, &values[i], 1) != OK) values[i] = -12345.0;
     }
 }
@@ -1086,15 +1230,19 @@ static const struct {
     {get, 6, EITHER(ALL & ~INSTANTIATED, ALL)},
     {set, 6, ALL & ~TERMINATED},
     {set_good_inputs, 3, ALL & ~TERMINATED},
+#if DOCKED_COUNT
+    {get_some_booleans, 2, EITHER(ALL & ~INSTANTIATED, ALL)},
+    {set_some_booleans, 4, ALL & ~TERMINATED},
+#endif
     {step, 24, STEPPING},
     {derivative, 4, ALL & ~INSTANTIATED},
     {output_derivative, 3, STEPPING},
-    {set_time, 3, EXCHANGING},
+    {set_time, 3, EXCHANGING | NO_STEPS},
     {set_states, 6, CONTINUOUS},
-    {get_states, 6, EXCHANGING},
-    {get_indicators, 1, EXCHANGING},
+    {get_states, 6, EXCHANGING | NO_STEPS},
+    {get_indicators, 1, EXCHANGING | NO_STEPS},
     {update_discrete_states, 3, EVENT},
-    {change_mode, 4, EXCHANGING},
+    {change_mode, 4, EXCHANGING | (HAS_EVENT_MODE ? STEPPING : 0)},
     {complete_step, 3, CONTINUOUS},
     {save_some, 2, ALL},
     {restore_some, 2, ALL},
@@ -1122,7 +1270,8 @@ static size_t draw_call(void) {
 
 static void call_one(Slot *slot) {
     const size_t k = draw_call();
-    if (!(slot->now.state & CALLS[k].states) && !once_in(100)) return;
+    const unsigned states = slot->exchange || !(CALLS[k].states & NO_STEPS) ? CALLS[k].states : 0;
+    if (!(slot->now.state & states) && !once_in(100)) return;
     if (save(slot, &slot->before) != OK) fail("a state cannot be saved", slot, ERROR);
     const Known known = slot->now;
     const unsigned log_mask = slot->log_mask;

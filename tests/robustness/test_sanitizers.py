@@ -26,7 +26,7 @@ CALLS = 1_200_000
 TIME_LIMIT = 600.0  # s; the runs take about ten seconds each
 SUITE_TIME_LIMIT = 3600.0  # s; about ten minutes on two cores
 PROPAGATORS = [(2, "rk4"), (3, "rk4"), (2, "auto"), (3, "auto"), (3, "split")]
-SCENES = [(2, "moving"), (3, "moving"), (2, "mixed"), (3, "mixed")]
+SCENES = [(fmi, scene) for scene in ("moving", "mixed", "docks", "capture") for fmi in (2, 3)]
 BUILDS = pytest.mark.parametrize(("fmi", "propagator"), [*PROPAGATORS, *SCENES])
 """FMI version, and propagator of RAW or one of CHANGING."""
 SANITIZED = (
@@ -109,8 +109,23 @@ MOVING = variant(
         ],
     },
 )
-CHANGING = {"moving": MOVING, "mixed": variant(MOVING, {"rotation.mass_change": "rate"})}
-"""Scenes with forces and a port that moves, in which all changes keep momentum, or poses alone do."""
+DOCKS = [{"name": "berth", "ports": ["A.fore", "B.aft"]}, {"name": "tail", "ports": ["B.fore", "C.aft"]}]
+RIVAL = {"name": "rival", "ports": ["A.fore", "C.aft"], "docked": False}
+CHANGING = {
+    "moving": MOVING,
+    "mixed": variant(MOVING, {"rotation.mass_change": "rate"}),
+    "docks": variant(MOVING, {"docks": DOCKS, "inputs.docked": ["berth", "tail"]}),
+    "capture": variant(
+        MOVING,
+        {
+            "docks": [*DOCKS, RIVAL],
+            "inputs": {**MOVING["inputs"], "pose": [], "motion": [], "docked": ["berth", "tail", "rival"]},
+            "rotation.propagator": "taylor",
+        },
+    ),
+}
+"""Scenes with forces: a port moves and all changes keep momentum, or poses alone do; docks open and close
+beside, or two of them at one port by turns."""
 
 
 @cache

@@ -21,9 +21,9 @@ def taylor_order(tolerance: float) -> int:
 
     Work that grows with the square of the order P, and steps that shrink with tolerance^(1/P), together are
     least near P = 1 - ln(tolerance)/2 ([JZ]). What each coefficient costs besides puts it higher: measured
-    (`make bench`), to the nearest even number, P = 4 - 0.58 ln(tolerance).
+    (`make bench`), to the nearest even number, P = 4.5 - 0.58 ln(tolerance).
     """
-    order = 2 * floor(2.5 - 0.29 * log(tolerance))
+    order = 2 * floor(2.75 - 0.29 * log(tolerance))
     return min(max(order, LEAST_ORDER), MOST_ORDER)
 
 
