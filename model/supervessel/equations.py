@@ -20,6 +20,7 @@ from supervessel.attitude import attitude_dot, rotation_matrix, to_inertial, uni
 from supervessel.changes import Change, change_functions, lookup_in
 from supervessel.docking import composite_body
 from supervessel.inertia import Body, from_upper_triangle, ldl, ldl_inverse, upper_triangle
+from supervessel.interrupts import interrupt_afterwards
 from supervessel.principal import principal, principal_forward, quaternion
 from supervessel.propagators import PROPAGATORS, Plan, plan_of
 from supervessel.propagators.bound import fastest_square
@@ -156,6 +157,7 @@ def simplification(on: bool) -> Iterator[None]:
         ca.GlobalOptions.setSimplificationOnTheFly(before)
 
 
+@interrupt_afterwards()
 @simplification(True)
 def equations(scene: Scene) -> Equations:
     """Returns the equations of a scene, folded for what it holds constant.
@@ -344,6 +346,7 @@ def p_start(scene: Scene) -> NDArray[np.float64]:
     return np.array(values)
 
 
+@interrupt_afterwards()
 @simplification(True)
 def composite_at_start(scene: Scene) -> dict[str, NDArray[np.float64]]:
     """Returns the parts of c by name, (n,) each, for the scene's own values of the inputs."""

@@ -308,7 +308,12 @@ class Scene(Table):
 
     @property
     def is_chosen(self) -> bool:
-        """Whether law and propagator are known: as given, or as `[accuracy]` has been answered."""
+        """Whether law and propagator are known: as given, or as `[accuracy]` has been answered.
+
+        Example:
+            >>> scene.is_chosen
+            True
+        """
         return self.accuracy is None or "law" in self.rotation.model_fields_set
 
     @property

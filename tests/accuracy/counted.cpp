@@ -35,9 +35,9 @@ int main(int count, char **arguments) {
     series.order = atoi(arguments[1]);
     const Counted x[7] = {1.0, 0.0, 0.0, 0.0, 0.1, 0.2, 0.3}, push[3] = {0.1, 0.2, 0.3};
     const Counted map[12] = {0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
-    Counted next[7];
+    Counted next[7], rest[3] = {0.0, 0.0, 0.0};
     taylor_series(x, push, map, 0.1, &series);
-    taylor_sum(&series, x, map, 1.0, next);
+    taylor_sum(&series, x, map, 1.0, next, rest);
     printf("%ld\n", operations);
     return 0;
 }

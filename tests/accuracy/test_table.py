@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -146,7 +145,6 @@ def environment(cache):
 
 @needs_posix
 def test_an_interrupt_keeps_whole_results_and_leaves_no_fmu(tmp_path, cache):
-    """Signals are sent until one is heard, as somebody at a keyboard would."""
     (tmp_path / "ball.toml").write_text(TEXT)
     folder = Path(cache) / "accuracy"
     before = set(folder.glob("*"))
@@ -160,16 +158,13 @@ def test_an_interrupt_keeps_whole_results_and_leaves_no_fmu(tmp_path, cache):
     )
     while running.poll() is None and not set(folder.glob("*.json")) - before:
         time.sleep(0.02)
-    while running.poll() is None:  # libraries that equations are made with lose some
-        running.send_signal(signal.SIGINT)
-        with suppress(subprocess.TimeoutExpired):
-            running.wait(10.0)
+    running.send_signal(signal.SIGINT)
     out, error = running.communicate()
     assert (running.returncode, out, error) == (1, "", "interrupted; no FMU was written\n")
     assert [path.name for path in tmp_path.iterdir()] == ["ball.toml"]
     kept = {path: path.read_bytes() for path in set(folder.glob("*")) - before}
     assert kept
-    assert all(json.loads(content)["refused"] is None for content in kept.values())
+    assert all(json.loads(content).get("refused") is None for content in kept.values())
     done = subprocess.run(
         command(), cwd=tmp_path, env=environment(cache), capture_output=True, text=True, check=False
     )

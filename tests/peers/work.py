@@ -26,11 +26,11 @@ import fliers
 import numpy as np
 import own
 from fliers import Array, Settings, Work
+from from_python import plain_step
 from run import build_host
 
 from peers import NAMES, version
 from support import series
-from twin import plain_step
 
 HERE = Path(__file__).resolve().parent
 MODULES = (HERE.parent, HERE.parent / "bench")

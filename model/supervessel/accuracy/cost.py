@@ -12,6 +12,7 @@ import numpy as np
 
 from supervessel.accuracy.histories import Histories, History
 from supervessel.equations import Equations
+from supervessel.interrupts import interrupt_afterwards
 from supervessel.propagators.exact import free_functions
 from supervessel.propagators.free_motion import FIRST_ANGLE
 from supervessel.propagators.taylor import taylor_order
@@ -68,11 +69,12 @@ def series_operations(order: int, *, gyroscopic: bool, turned: bool) -> int:
     gyroscopic : whether the law has products of rates
     turned     : whether the series have axes of their own
     """
-    width, alone, rest = (10, 90, 157) if gyroscopic else (7, 72, 145)
+    width, alone, rest = (10, 90, 175) if gyroscopic else (7, 72, 163)
     products = width * (order - 1) * (order - 2)
     return products + alone * (order - 1) + 15 * order + rest + (TURNS if turned else 0)
 
 
+@interrupt_afterwards()
 def costs(model: Equations, law: Law, tolerance: float) -> Costs:
     """Returns the operations of a scene's library, flown at a tolerance."""
     count = {f.name(): operations(f) for f in (*model.propagation, *model.changing)}
