@@ -101,7 +101,7 @@ def _scale(inertia: ca.SX) -> ca.SX:
     mean = 0.5 * inertia[0, 0] + 0.5 * inertia[1, 1]
     unit = mean - (1.0 - 2.0**-52) * mean
     up, down = ca.floor(2.0**-52 / unit), ca.floor(2.0**52 * unit)
-    return ca.if_else(up >= 1.0, up, 1.0 / down)
+    return ca.fmax(up, 1.0) / ca.fmax(down, 1.0)
 
 
 def _moments(inertia: ca.SX) -> ca.SX:

@@ -1,7 +1,7 @@
 /* Runs fmu_build/c/taylor.c with numbers that count what is done to them: slow operations as five. */
-#include <cmath>
-#include <cstdio>
-#include <cstdlib>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 
 static long operations;
 
@@ -23,7 +23,7 @@ static Counted operator/(Counted a, Counted b) { return did(a.value / b.value, 5
 static Counted operator-(Counted a) { return did(-a.value, 1); }
 static Counted &operator+=(Counted &a, Counted b) { return a = a + b; }
 static bool operator>(Counted a, Counted b) { return a.value > b.value; }
-static Counted sqrt(Counted a) { return did(std::sqrt(a.value), 5); }
+static Counted sqrt(Counted a) { return did(::sqrt(a.value), 5); }
 
 #define double Counted
 #include "taylor.c"

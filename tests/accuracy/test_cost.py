@@ -25,7 +25,7 @@ def test_operations_of_a_series_are_those_of_its_loop_in_c(tmp_path, product_cou
     (tmp_path / "scene.h").write_text(
         f"#define STEPS 3\n#define STEPS_BY_SERIES 3\n#define PRODUCT_COUNT {product_count}\n"
     )
-    command = [sys.executable, "-m", "ziglang", "c++", "-w", "-o", "counted", "counted.cpp"]
+    command = [sys.executable, "-m", "ziglang", "cc", "-w", "-o", "counted", "counted.cpp"]
     subprocess.run(command, cwd=tmp_path, check=True)
     for order in (6, 8, 12, 16, 20):
         done = subprocess.run(
