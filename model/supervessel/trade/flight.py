@@ -131,14 +131,17 @@ def build_all(scene: Scene, choices: Sequence[Choice], shop: Workshop, done: Cal
     _build_host(shop.folder)
     pool = ThreadPoolExecutor(AT_ONCE)
     try:
-        futures = {
-            choice: pool.submit(
-                _build, variant_of(scene, choice), shop.folder / f"b{len(shop.built) + i}", trial=shop.trial
-            )
-            for i, choice in enumerate(wanted)
-        }
-        for choice, future in futures.items():
-            shop.built[choice] = future.result()
+        begun = {}
+        for i, choice in enumerate(
+            wanted
+        ):  # CasADi's expressions are made in one thread, compilers run aside
+            scene_built, folder = variant_of(scene, choice), shop.folder / f"b{len(shop.built) + i}"
+            model = equations(scene_built)
+            packed, names, description = _sources(scene_built, model)
+            compiling = pool.submit(_compile, packed, names, scene_built.name, folder, trial=shop.trial)
+            begun[choice] = model, description, compiling
+        for choice, (model, description, compiling) in begun.items():
+            shop.built[choice] = _built(model, description, compiling.result())
             done(f"build {choice}")
     finally:
         pool.shutdown(cancel_futures=True)
@@ -154,27 +157,38 @@ def builds(choices: Sequence[Choice], shop: Workshop) -> int:
     return len({source_of(choice) for choice in choices} - shop.built.keys())
 
 
-def _build(scene: Scene, folder: Path, *, trial: bool) -> Built:
-    """Returns the library of a scene's FMU."""
+def _sources(scene: Scene, model: Equations) -> tuple[dict[str, bytes], list[str], bytes]:
+    """Returns the files of a scene's sources/, the names of those to compile, and the model description."""
     # Package fmu_build is built on this one: looked up only here.
-    from fmu_build.build import compile_sources, generate  # noqa: PLC0415
-    from fmu_build.compiler import FLAGS, TRIAL_FLAGS  # noqa: PLC0415
-    from fmu_build.platforms import host_platform  # noqa: PLC0415
+    from fmu_build.build import generate  # noqa: PLC0415
     from fmu_build.sources import source_file_names, source_files  # noqa: PLC0415
 
-    model, flags = equations(scene), TRIAL_FLAGS if trial else FLAGS
     sources, description = generate(scene, 3, model)
-    packed = source_files(sources, 3, scene.name)
-    names = source_file_names(sources, 3)
-    [(path, library)] = compile_sources(packed, names, 3, (host_platform(),), scene.name, flags).items()
-    file = folder / Path(path).name
+    return source_files(sources, 3, scene.name), source_file_names(sources, 3), description
+
+
+def _compile(
+    packed: Mapping[str, bytes], names: Sequence[str], identifier: str, folder: Path, *, trial: bool
+) -> Path:
+    """Returns the library that sources make."""
+    from fmu_build.build import compile_sources  # noqa: PLC0415
+    from fmu_build.compiler import FLAGS, TRIAL_FLAGS  # noqa: PLC0415
+    from fmu_build.platforms import host_platform  # noqa: PLC0415
+
+    flags = TRIAL_FLAGS if trial else FLAGS
+    [(path, library)] = compile_sources(packed, names, 3, (host_platform(),), identifier, flags).items()
     folder.mkdir()
+    file = folder / Path(path).name
     file.write_bytes(library)
+    return file
+
+
+def _built(model: Equations, description: bytes, library: Path) -> Built:
     root = ET.fromstring(description)
     variables = root.find("ModelVariables")
     assert variables is not None
     references = {v.attrib["name"]: int(v.attrib["valueReference"]) for v in variables}
-    return Built(model, file, root.attrib["instantiationToken"], references)
+    return Built(model, library, root.attrib["instantiationToken"], references)
 
 
 def _host(folder: Path) -> Path:
