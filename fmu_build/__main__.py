@@ -1,8 +1,6 @@
 """Command line: python -m fmu_build SCENE.toml [-o OUT.fmu] [--fmi 2|3] [--platform NAME ...|all]."""
 
 import argparse
-import os
-import shutil
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -13,6 +11,7 @@ from fmu_build.errors import BuildError
 from fmu_build.platforms import PLATFORMS, platforms_named
 from supervessel import Scene, SceneError, choose, load_scene
 from supervessel.accuracy import said
+from supervessel.console import print_results, show_progress
 from supervessel.trade import TradeError
 
 
@@ -58,31 +57,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("interrupted; no FMU was written", file=sys.stderr)
         return 1
-    return _print([*chosen, str(output)])
+    return print_results("\n".join([*chosen, str(output)]), "the FMU is built, its path")
 
 
 def _choose(scene: Scene) -> list[str]:
-    """Returns what `[accuracy]` chooses, in a line; shows on a terminal how far that is."""
-    width = shutil.get_terminal_size().columns - 1
-
-    def show(what: str) -> None:
-        if sys.stderr.isatty():
-            print(f"\r{f'accuracy: {what}'[:width]:<{width}}", end="", file=sys.stderr, flush=True)
-
-    _, evidence = choose(scene, show)
-    show("")
+    """Returns what `[accuracy]` chooses, in a line; shows how far that is."""
+    _, evidence = choose(scene, lambda what: show_progress(f"accuracy: {what}"))
+    show_progress("accuracy: ")
     return [said(evidence)]
-
-
-def _print(lines: Sequence[str]) -> int:
-    """Prints results, the FMU's path last; returns 0, or 1 where standard output does not take them."""
-    try:
-        print("\n".join(lines), flush=True)
-    except (OSError, UnicodeError) as error:
-        print(f"the FMU is built, its path cannot be printed: {error}", file=sys.stderr)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left is flushed at the end
-        return 1
-    return 0
 
 
 if __name__ == "__main__":

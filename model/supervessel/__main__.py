@@ -6,8 +6,6 @@ supervessel trade SCENE.toml [-o FOLDER] [--quick] [--duration S]
 
 import argparse
 import json
-import os
-import shutil
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -15,6 +13,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import get_args
 
+from supervessel.console import print_results, show_progress
 from supervessel.loading import load_scene, parse_scene
 from supervessel.orbiter import ScenarioError, import_scenario
 from supervessel.problems import SceneError
@@ -88,7 +87,7 @@ def _import(options: argparse.Namespace) -> int:
     except OSError as error:
         print(f"{output}: cannot be written: {error.strerror}", file=sys.stderr)
         return 1
-    return _print(str(output), "the scene is written, its path")
+    return print_results(str(output), "the scene is written, its path")
 
 
 def _add_trade(parser: argparse.ArgumentParser) -> None:
@@ -136,7 +135,7 @@ def _trade(options: argparse.Namespace) -> int:
             "\ninterrupted; what has been flown is kept, the same command goes on from there", file=sys.stderr
         )
         return 1
-    return _print(f"{tables}\n\n{folder}", f"the trade is written to {folder}, its tables")
+    return print_results(f"{tables}\n\n{folder}", f"the trade is written to {folder}, its tables")
 
 
 def _lasting(scene: Scene, duration: float | None) -> Scene:
@@ -149,13 +148,9 @@ def _lasting(scene: Scene, duration: float | None) -> Scene:
 
 
 def _progress(done: int, total: int, what: str) -> None:
-    """Shows how far a trade has come, on a terminal only."""
-    if not sys.stderr.isatty():
-        return
-    width = shutil.get_terminal_size().columns - 1
+    """Shows how far a trade has come."""
     bar = "#" * (24 * done // total)
-    end = "\n" if done == total else ""
-    print(f"\r{f'[{bar:.<24}] {done}/{total} {what}'[:width]:<{width}}", end=end, file=sys.stderr, flush=True)
+    show_progress(f"[{bar:.<24}] {done}/{total} {what}", "\n" if done == total else "")
 
 
 def _write(text: str, output: Path) -> None:
@@ -172,17 +167,6 @@ def _write(text: str, output: Path) -> None:
         except BaseException:
             part.unlink(missing_ok=True)
             raise
-
-
-def _print(text: str, what: str) -> int:
-    """Prints results; returns 0, or 1 where standard output does not take them; `what` names them then."""
-    try:
-        print(text, flush=True)
-    except (OSError, UnicodeError) as error:
-        print(f"{what} cannot be printed: {error}", file=sys.stderr)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left is flushed at the end
-        return 1
-    return 0
 
 
 if __name__ == "__main__":

@@ -1,27 +1,16 @@
-"""A cache of the tests' own, removed at the end; how many random scenes the long run confirms."""
-
-import os
-import tempfile
+"""What tests of an accuracy share; how many random scenes the long run confirms."""
 
 import pytest
+
+from support.processes import cache
+
+__all__ = ["cache"]
 
 SCENES = 200
 
 
 def pytest_addoption(parser):
     parser.addoption("--scenes", type=int, default=SCENES, help="random scenes that make accuracy confirms")
-
-
-@pytest.fixture(scope="session", autouse=True)
-def cache():
-    before = os.environ.get("SUPERVESSEL_CACHE")
-    with tempfile.TemporaryDirectory(prefix="supervessel-test-") as folder:
-        os.environ["SUPERVESSEL_CACHE"] = folder
-        yield folder
-    if before is None:
-        del os.environ["SUPERVESSEL_CACHE"]
-    else:
-        os.environ["SUPERVESSEL_CACHE"] = before
 
 
 @pytest.fixture

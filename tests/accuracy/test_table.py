@@ -1,12 +1,7 @@
 """The table `[accuracy]`: what is read, and what is refused, by place and value."""
 
 import json
-import os
-import signal
-import subprocess
 import sys
-import time
-from pathlib import Path
 
 import pytest
 
@@ -14,8 +9,8 @@ from supervessel import SceneError, parse_scene
 from supervessel.scene import without_accuracy
 from supervessel.trade.choices import Choice, Model, variant_of
 from support import ISS_DG, variant
+from support.processes import interrupted, needs_posix, run
 
-ROOT = Path(__file__).parents[2]
 ACCURACY = {"attitude": 1e-4, "rate": 1e-6, "horizon": 600.0, "step": 0.1}
 SCENE = variant(
     ISS_DG,
@@ -29,8 +24,6 @@ SCENE = variant(
         "accuracy": ACCURACY,
     },
 )
-
-needs_posix = pytest.mark.skipif(os.name != "posix", reason="needs signals and ulimit")
 
 
 def problems(changes):
@@ -138,36 +131,15 @@ def command(limit=""):
     return ["sh", "-c", f"{limit}exec {build}"]
 
 
-def environment(cache):
-    path = os.pathsep.join((str(ROOT), str(ROOT / "model")))
-    return os.environ | {"PYTHONPATH": path, "SUPERVESSEL_CACHE": str(cache)}
-
-
 @needs_posix
 def test_an_interrupt_keeps_whole_results_and_leaves_no_fmu(tmp_path, cache):
     (tmp_path / "ball.toml").write_text(TEXT)
-    folder = Path(cache) / "accuracy"
-    before = set(folder.glob("*"))
-    running = subprocess.Popen(
-        command(),
-        cwd=tmp_path,
-        env=environment(cache),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    while running.poll() is None and not set(folder.glob("*.json")) - before:
-        time.sleep(0.02)
-    running.send_signal(signal.SIGINT)
-    out, error = running.communicate()
-    assert (running.returncode, out, error) == (1, "", "interrupted; no FMU was written\n")
+    done, kept = interrupted(command(), tmp_path, cache, "accuracy")
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", "interrupted; no FMU was written\n")
     assert [path.name for path in tmp_path.iterdir()] == ["ball.toml"]
-    kept = {path: path.read_bytes() for path in set(folder.glob("*")) - before}
     assert kept
     assert all(json.loads(content).get("refused") is None for content in kept.values())
-    done = subprocess.run(
-        command(), cwd=tmp_path, env=environment(cache), capture_output=True, text=True, check=False
-    )
+    done = run(command(), tmp_path, cache)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.splitlines()[1] == "ball.fmu"
     assert {path: path.read_bytes() for path in kept} == kept
@@ -177,14 +149,7 @@ def test_an_interrupt_keeps_whole_results_and_leaves_no_fmu(tmp_path, cache):
 def test_a_full_disk_is_said_and_leaves_nothing_half_written(tmp_path, cache):
     """The room suffices for no history of inputs."""
     (tmp_path / "ball.toml").write_text(TEXT.replace("horizon = 50.0", "horizon = 51.0"))
-    done = subprocess.run(
-        command("ulimit -f 1; "),
-        cwd=tmp_path,
-        env=environment(cache),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run(command("ulimit -f 1; "), tmp_path, cache)
     assert (done.returncode, done.stdout) == (1, "")
     assert "Traceback" not in done.stderr
     assert done.stderr.strip()

@@ -9,7 +9,7 @@ from hypothesis import Phase, given, settings
 
 from changes.histories import ByExchange, ByFmu, ByTwin, Driver, Values, elements
 from supervessel import reference
-from support import DISCARD, EPS, OK, Instance, scene
+from support import DISCARD, EPS, ISS_DG, OK, Instance, scene
 
 # The station and the ship of Orbiter, converted to right-handed axes.
 MIR: dict[str, Any] = {
@@ -24,17 +24,7 @@ MIR: dict[str, Any] = {
                 "fore": {"position": [0.0, 0.12, -10.74], "direction": [0, 0, -1], "alignment": [0, 1, 0]},
             },
         },
-        "DG": {
-            "mass": 24500.0,
-            "pmi": [15.5, 22.1, 7.7],
-            "ports": {
-                "nose": {
-                    "position": [0.0, -0.49, -10.076],
-                    "direction": [0, 0, -1],
-                    "alignment": [0, 1, 0],
-                }
-            },
-        },
+        "DG": ISS_DG["vessels"]["DG"],
     },
     "docks": [
         {"ports": ["Mir.side", "DG.nose"], "name": "berth", "docked": False},

@@ -1,16 +1,11 @@
-"""A cache of the tests' own: nothing has been flown before, and the compiler starts cold once."""
+"""What tests of a trade share."""
 
 import pytest
 
 from supervessel.trade.flight import workshop
+from support.processes import cache
 
-
-@pytest.fixture(scope="session", autouse=True)
-def cache(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        folder = tmp_path_factory.mktemp("cache")
-        patch.setenv("SUPERVESSEL_CACHE", str(folder))
-        yield folder
+__all__ = ["cache"]
 
 
 @pytest.fixture

@@ -1,18 +1,13 @@
 """`supervessel trade`: what it prints and leaves, what it refuses, and that an interrupt loses nothing."""
 
 import json
-import os
-import signal
-import subprocess
 import sys
-import time
-from pathlib import Path
 
 import pytest
 
 from supervessel.trade import table
-
-ROOT = Path(__file__).parents[2]
+from support import processes
+from support.processes import needs_posix, run
 
 SCENE = """\
 name = "ball"
@@ -29,22 +24,9 @@ step = 1.0
 
 FILES = ["trade.json", "trade.md", "trade.png", "trade.svg"]
 
-needs_posix = pytest.mark.skipif(os.name != "posix", reason="needs signals and ulimit")
-
 
 def command(*arguments):
     return [sys.executable, "-m", "supervessel", "trade", *map(str, arguments)]
-
-
-def environment(cache):
-    path = os.pathsep.join((str(ROOT), str(ROOT / "model")))
-    return os.environ | {"PYTHONPATH": path, "SUPERVESSEL_CACHE": str(cache)}
-
-
-def run(folder, cache, *arguments):
-    return subprocess.run(
-        command(*arguments), cwd=folder, env=environment(cache), capture_output=True, text=True, check=False
-    )
 
 
 def files(folder):
@@ -56,21 +38,8 @@ def interrupted(tmp_path_factory, cache):
     """A trade interrupted when it has its first results: its end, its folder, and what it has kept."""
     folder = tmp_path_factory.mktemp("work")
     (folder / "ball.toml").write_text(SCENE)
-    before = set(cache.glob("trade/*"))
-    running = subprocess.Popen(
-        command("ball.toml", "--quick", "-o", "out"),
-        cwd=folder,
-        env=environment(cache),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    while running.poll() is None and not set(cache.glob("trade/*.json")) - before:
-        time.sleep(0.05)
-    running.send_signal(signal.SIGINT)
-    out, error = running.communicate()
-    kept = {path.name: path.read_bytes() for path in set(cache.glob("trade/*")) - before}
-    done = subprocess.CompletedProcess(running.args, running.returncode, out, error)
+    words = command("ball.toml", "--quick", "-o", "out")
+    done, kept = processes.interrupted(words, folder, cache, "trade")
     return done, files(folder / "out"), kept
 
 
@@ -79,7 +48,7 @@ def finished(tmp_path_factory, cache, interrupted):
     """The same trade from its beginning: its end and its folder."""
     folder = tmp_path_factory.mktemp("work")
     (folder / "ball.toml").write_text(SCENE)
-    return run(folder, cache, "ball.toml", "--quick", "-o", "out"), folder
+    return run(command("ball.toml", "--quick", "-o", "out"), folder, cache), folder
 
 
 @needs_posix
@@ -89,8 +58,8 @@ def test_an_interrupt_leaves_no_files_and_keeps_whole_results(interrupted):
     assert (done.returncode, done.stdout, done.stderr.strip()) == (1, "", message)
     assert left == []
     assert kept
-    for name, content in kept.items():
-        assert name.endswith(".json")
+    for path, content in kept.items():
+        assert path.name.endswith(".json")
         assert len(json.loads(content)["samples"]) == 10  # each of ten steps
 
 
@@ -98,8 +67,8 @@ def test_an_interrupt_leaves_no_files_and_keeps_whole_results(interrupted):
 def test_the_same_command_goes_on_from_what_was_kept(interrupted, finished, cache):
     done, _ = finished
     assert done.returncode == 0, done.stderr
-    for name, content in interrupted[2].items():
-        assert (cache / "trade" / name).read_bytes() == content
+    for path, content in interrupted[2].items():
+        assert path.read_bytes() == content
     assert len(list(cache.glob("trade/*"))) > len(interrupted[2])
 
 
@@ -118,7 +87,7 @@ def test_tables_are_printed_and_all_is_in_the_folder(finished):
 def test_a_second_call_gives_the_same_bytes(finished, cache):
     _, folder = finished
     before = {name: (folder / "out" / name).read_bytes() for name in FILES}
-    again = run(folder, cache, "ball.toml", "--quick", "-o", "again")
+    again = run(command("ball.toml", "--quick", "-o", "again"), folder, cache)
     assert again.returncode == 0, again.stderr
     assert {name: (folder / "again" / name).read_bytes() for name in FILES} == before
 
@@ -128,9 +97,7 @@ def test_a_full_disk_leaves_the_old_files_as_they_are(finished, cache):
     _, folder = finished
     before = {name: (folder / "out" / name).read_bytes() for name in FILES}
     limited = f"ulimit -f 8 && exec {' '.join(command('ball.toml', '--quick', '-o', 'out'))}"
-    done = subprocess.run(
-        ["sh", "-c", limited], cwd=folder, env=environment(cache), capture_output=True, text=True, check=False
-    )
+    done = run(["sh", "-c", limited], folder, cache)
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr == "ball.toml: out: cannot be written: File too large\n"
     assert {path.name: path.read_bytes() for path in (folder / "out").iterdir()} == before
@@ -175,7 +142,7 @@ def test_a_full_disk_leaves_the_old_files_as_they_are(finished, cache):
 )
 def test_what_cannot_be_done_is_said_before_any_work(tmp_path, change, arguments, status, message):
     (tmp_path / "ball.toml").write_text(SCENE.replace(*change))
-    done = run(tmp_path, tmp_path / "cache", "ball.toml", *arguments)
+    done = run(command("ball.toml", *arguments), tmp_path, tmp_path / "cache")
     assert files(tmp_path) == ["ball.toml"]
     assert (done.returncode, done.stdout) == (status, "")
     assert done.stderr.endswith(message)

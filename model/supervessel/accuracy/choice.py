@@ -4,11 +4,11 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from supervessel.accuracy.flights import LONG, AccuracyError, place_of, read
+from supervessel.accuracy.flights import LONG, AccuracyError
 from supervessel.accuracy.search import MARGIN, Progress, Search, Tried, begun
 from supervessel.scene import CHOSEN, Accuracy, Rotation, Scene
 from supervessel.trade.choices import BEST, Choice, reference_choices
-from supervessel.trade.flight import workshop, write_whole
+from supervessel.trade.flight import place_of, read, workshop, write_whole
 
 CLAIM = (
     "From the scene's start, in communication steps of that length, with inputs anywhere in their ranges and "
@@ -51,7 +51,7 @@ def choose(scene: Scene, progress: Progress = lambda _: None) -> tuple[Scene, di
     given = scene.rotation.model_dump(exclude_unset=True)
     opened = {key: value for key, value in given.items() if key not in CHOSEN}
     whole = scene.model_copy(update={"rotation": Rotation.model_validate(opened)})
-    place = place_of(whole, "choice")
+    place = place_of("accuracy", whole, "choice")
     kept = read(place)
     if kept is None:
         kept = _chosen(whole, accuracy, progress)

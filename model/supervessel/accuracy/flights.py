@@ -1,9 +1,6 @@
-"""Flights through histories of inputs, two processes at a time, and where results are kept."""
+"""Flights through histories of inputs, two processes at a time."""
 
-import hashlib
-import json
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +17,7 @@ from supervessel.trade.flight import (
     Inputs,
     Workshop,
     build_all,
-    maker,
+    job_of,
     run_host,
     source_of,
 )
@@ -80,14 +77,7 @@ def fly(
     """Returns samples, (n, samples, 7), and sub-steps of a choice in histories; or why one was refused."""
     build_all(scene, [choice], shop, lambda _: None)
     course, count = every.course, len(which)
-    job = {
-        "tolerance": choice.tolerance or 0.0,
-        "size": course.size,
-        "last_size": course.last_size,
-        "steps": course.steps,
-        "sampled": course.sampled.tolist(),
-        "seconds": 0.0,
-    }
+    job = job_of(choice, course, 0.0)
     courses = [every.flown[i].inputs.written(shop.folder / f"history{i}", once=True) for i in which]
     size = 1 if course.steps > LONG else max(1, (count + 1) // AT_ONCE)
     parts = [range(i, min(i + size, count)) for i in range(0, count, size)]
@@ -127,22 +117,3 @@ def apart(samples: Array, truth: Array) -> tuple[Array, Array]:
     turned = attitude_apart(samples[..., :4].reshape(-1, 4), truth[..., :4].reshape(-1, 4))
     off = np.linalg.norm(samples[..., 4:] - truth[..., 4:], axis=2)
     return turned.reshape(off.shape).max(1), off.max(1)
-
-
-# What has been found is kept under a name that says everything that it depends on.
-
-
-def place_of(scene: Scene, what: Any) -> Path:
-    """Returns where something is kept that was found about a scene."""
-    from fmu_build.compiler import compiler_cache  # noqa: PLC0415
-
-    said = json.dumps([scene.model_dump(mode="json"), what, maker()], sort_keys=True)
-    return compiler_cache() / "accuracy" / f"{hashlib.sha256(said.encode()).hexdigest()}.json"
-
-
-def read(place: Path) -> Any:
-    """Returns what is kept, None where nothing whole is."""
-    try:
-        return json.loads(place.read_text())
-    except (OSError, ValueError):
-        return None

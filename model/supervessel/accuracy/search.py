@@ -9,20 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supervessel.accuracy.cost import Costs, costs, free_operations, per_step
-from supervessel.accuracy.flights import AccuracyError, apart, body_of, fly, followed, judged, place_of, read
+from supervessel.accuracy.flights import AccuracyError, apart, body_of, fly, followed, judged
 from supervessel.accuracy.histories import Histories, histories
 from supervessel.equations import Equations, equations
 from supervessel.propagators import plan_of
 from supervessel.scene import Accuracy, Law, Scene
 from supervessel.trade.choices import BEST, FINEST, LAWS_TRIED, Choice, Model, reference_choices, variant_of
-from supervessel.trade.flight import Workshop, build_all, source_of, write_whole
+from supervessel.trade.flight import Workshop, build_all, place_of, read, source_of, write_whole
 from supervessel.trade.study import HALF_ULP
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 MARGIN = 5.0
-"""Least of what is asked over the largest error found: others were up to 3.4 times as large (README)."""
+"""Least of what is asked over the largest error found: others were up to 3.6 times as large (README)."""
 
 TOLERANCES = tuple(float(f"1e-{k}") for k in range(1, 16))
 
@@ -317,7 +317,7 @@ class Search:
             return Errors([], [], [])
         anything = self.accuracy.model_copy(update={"attitude": 1.0, "rate": None})
         flown_in = self.scene.model_copy(update={"accuracy": anything})  # whatever is asked of the flights
-        place = place_of(flown_in, ["errors", asdict(choice), part.start, part.stop])
+        place = place_of("accuracy", flown_in, ["errors", asdict(choice), part.start, part.stop])
         kept = read(place)
         if kept is not None:
             return Errors(**kept)

@@ -106,7 +106,7 @@ def fly_all(
     compiler fails.
     """
     course = course_of(scene)
-    places = {choice: _place(scene, choice) for choice in choices}
+    places = {choice: place_of("trade", scene, asdict(choice)) for choice in choices}
     found: dict[Choice, Flown] = {}
     for choice, place in places.items():
         kept = _read(place)
@@ -132,9 +132,8 @@ def build_all(scene: Scene, choices: Sequence[Choice], shop: Workshop, done: Cal
     pool = ThreadPoolExecutor(AT_ONCE)
     try:
         begun = {}
-        for i, choice in enumerate(
-            wanted
-        ):  # CasADi's expressions are made in one thread, compilers run aside
+        # CasADi's expressions are made in one thread: only compilers run beside it.
+        for i, choice in enumerate(wanted):
             scene_built, folder = variant_of(scene, choice), shop.folder / f"b{len(shop.built) + i}"
             model = equations(scene_built)
             packed, names, description = _sources(scene_built, model)
@@ -215,14 +214,7 @@ def _fly(built: Built, choice: Choice, course: Course, shop: Workshop) -> Flown:
         np.column_stack([np.zeros((course.steps, 0)), *moving.values()]),
         np.column_stack([np.zeros((course.steps, 0)), *course.booleans.values()]),
     )
-    job = {
-        "tolerance": choice.tolerance or 0.0,
-        "size": course.size,
-        "last_size": course.last_size,
-        "steps": course.steps,
-        "sampled": course.sampled.tolist(),
-        "seconds": TIMING,
-    }
+    job = job_of(choice, course, TIMING)
     names = list(moving), list(course.booleans)
     ended = run_host(built, shop.folder, job, names, [inputs.written(shop.folder / "inputs")])
     if ended is None:
@@ -265,6 +257,18 @@ class Inputs:
         for key, kind in () if once and places["booleans"].exists() else kinds.items():
             places[key].write_bytes(np.ascontiguousarray(getattr(self, key), dtype=kind).tobytes() or b"\0")
         return {key: str(place) for key, place in places.items()} | {"row_count": len(self.rows)}
+
+
+def job_of(choice: Choice, course: Course, seconds: float) -> dict[str, Any]:
+    """Returns what host.py is told of flights through an experiment; seconds for timing, 0: none."""
+    return {
+        "tolerance": choice.tolerance or 0.0,
+        "size": course.size,
+        "last_size": course.last_size,
+        "steps": course.steps,
+        "sampled": course.sampled.tolist(),
+        "seconds": seconds,
+    }
 
 
 def run_host(
@@ -321,15 +325,20 @@ def _refused(reason: str) -> Flown:
 # What has been flown is kept under a name that says everything that it depends on.
 
 
-def _place(scene: Scene, choice: Choice) -> Path:
+def place_of(kind: str, scene: Scene, what: Any) -> Path:
+    """Returns where something is kept that was found about a scene.
+
+    kind : folder in the cache
+    what : it was, as JSON takes it
+    """
     from fmu_build.compiler import compiler_cache  # noqa: PLC0415
 
-    said = json.dumps([scene.model_dump(mode="json"), asdict(choice), maker()], sort_keys=True)
-    return compiler_cache() / "trade" / f"{hashlib.sha256(said.encode()).hexdigest()}.json"
+    said = json.dumps([scene.model_dump(mode="json"), what, _maker()], sort_keys=True)
+    return compiler_cache() / kind / f"{hashlib.sha256(said.encode()).hexdigest()}.json"
 
 
 @cache
-def maker() -> list[str]:
+def _maker() -> list[str]:
     """Returns what turns a choice into a result: this machine, versions, our own files."""
     import fmu_build  # noqa: PLC0415
 
@@ -342,13 +351,17 @@ def maker() -> list[str]:
     return [platform.node(), platform.machine(), platform.system(), *versions, files.hexdigest()]
 
 
-def _read(place: Path) -> Flown | None:
-    """Returns a kept result, None where there is none that is whole."""
+def read(place: Path) -> Any:
+    """Returns what is kept, None where nothing whole is."""
     try:
-        kept = json.loads(place.read_text())
+        return json.loads(place.read_text())
     except (OSError, ValueError):
         return None
-    return Flown(**(kept | {"samples": np.array(kept["samples"]).reshape(-1, 7)}))
+
+
+def _read(place: Path) -> Flown | None:
+    kept = read(place)
+    return None if kept is None else Flown(**(kept | {"samples": np.array(kept["samples"]).reshape(-1, 7)}))
 
 
 def _keep(place: Path, flown: Flown) -> None:

@@ -1,0 +1,62 @@
+"""Commands run as a user runs them, with a cache of the tests' own."""
+
+import os
+import signal
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+needs_posix = pytest.mark.skipif(os.name != "posix", reason="needs signals and ulimit")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cache() -> Iterator[Path]:
+    """A cache in which nothing has been flown before, removed at the end: the compiler starts cold once."""
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        tempfile.TemporaryDirectory(prefix="supervessel-test-") as name,
+    ):
+        patch.setenv("SUPERVESSEL_CACHE", name)
+        yield Path(name)
+
+
+def run(command: Sequence[str], folder: Path, cache: Path) -> subprocess.CompletedProcess[str]:
+    """Returns what came of a command in a folder."""
+    return subprocess.run(
+        command, cwd=folder, env=_environment(cache), capture_output=True, text=True, check=False
+    )
+
+
+def interrupted(
+    command: Sequence[str], folder: Path, cache: Path, kind: str
+) -> tuple[subprocess.CompletedProcess[str], dict[Path, bytes]]:
+    """Returns what came of a command, interrupted when it has its first results, and what it has kept.
+
+    kind : folder of these results in the cache
+    """
+    before = set(cache.glob(f"{kind}/*"))
+    running = subprocess.Popen(
+        command,
+        cwd=folder,
+        env=_environment(cache),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    while running.poll() is None and not set(cache.glob(f"{kind}/*.json")) - before:
+        time.sleep(0.02)
+    running.send_signal(signal.SIGINT)
+    out, error = running.communicate()
+    done = subprocess.CompletedProcess(running.args, running.returncode, out, error)
+    return done, {path: path.read_bytes() for path in set(cache.glob(f"{kind}/*")) - before}
+
+
+def _environment(cache: Path) -> dict[str, str]:
+    path = os.pathsep.join((str(ROOT), str(ROOT / "model")))
+    return os.environ | {"PYTHONPATH": path, "SUPERVESSEL_CACHE": str(cache)}
