@@ -9,7 +9,7 @@ run: .venv/installed
 	$(BIN)/python examples/iss_dg.py
 
 test: .venv/installed-dev
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto --dist worksteal
 
 check: .venv/installed-dev
 	$(BIN)/ruff format --check model fmu_build tests examples

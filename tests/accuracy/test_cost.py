@@ -1,17 +1,26 @@
 """What candidates cost: counted, in the C as it is written."""
 
 import shutil
-import subprocess
-import sys
+from ctypes import CDLL
 from pathlib import Path
 
 import casadi as ca
 import pytest
 
+from fmu_build.compiler import TRIAL_FLAGS, compile_library
+from fmu_build.platforms import host_platform
 from fmu_build.sources import LAYER
 from supervessel.accuracy.cost import free_operations, operations, series_operations
 
 HERE = Path(__file__).parent
+
+FLAGS = (
+    *(flag for flag in TRIAL_FLAGS if not flag.startswith("-std=")),
+    "-w",
+    "-nostdlib++",
+    "-fno-exceptions",
+)
+"""Those of a library of C, so that the compiler has all that it links: it comes with no C++ library built."""
 
 
 @pytest.mark.parametrize(
@@ -25,13 +34,12 @@ def test_operations_of_a_series_are_those_of_its_loop_in_c(tmp_path, product_cou
     (tmp_path / "scene.h").write_text(
         f"#define STEPS 3\n#define STEPS_BY_SERIES 3\n#define PRODUCT_COUNT {product_count}\n"
     )
-    command = [sys.executable, "-m", "ziglang", "cc", "-w", "-o", "counted", "counted.cpp"]
-    subprocess.run(command, cwd=tmp_path, check=True)
+    platform = host_platform()
+    library = tmp_path / f"counted{platform.suffix}"
+    compile_library([tmp_path / "counted.cpp"], platform, library, FLAGS)
+    counted = CDLL(str(library)).counted
     for order in (6, 8, 12, 16, 20):
-        done = subprocess.run(
-            [tmp_path / "counted", str(order)], capture_output=True, text=True, check=True, cwd=tmp_path
-        )
-        assert int(done.stdout) == series_operations(order, gyroscopic=gyroscopic, turned=turned), order
+        assert counted(order) == series_operations(order, gyroscopic=gyroscopic, turned=turned), order
 
 
 def test_slow_operations_count_as_several_and_moves_as_none():

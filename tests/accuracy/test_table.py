@@ -121,7 +121,7 @@ torque = true
 torque = [-0.1, 0.1]
 [accuracy]
 attitude = 1e-6
-horizon = 50.0
+horizon = 5.0
 step = 0.1
 """
 
@@ -148,7 +148,7 @@ def test_an_interrupt_keeps_whole_results_and_leaves_no_fmu(tmp_path, cache):
 @needs_posix
 def test_a_full_disk_is_said_and_leaves_nothing_half_written(tmp_path, cache):
     """The room suffices for no history of inputs."""
-    (tmp_path / "ball.toml").write_text(TEXT.replace("horizon = 50.0", "horizon = 51.0"))
+    (tmp_path / "ball.toml").write_text(TEXT.replace("horizon = 5.0", "horizon = 5.1"))
     done = run(command("ulimit -f 1; "), tmp_path, cache)
     assert (done.returncode, done.stdout) == (1, "")
     assert "Traceback" not in done.stderr

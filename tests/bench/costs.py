@@ -5,7 +5,8 @@ from pathlib import Path
 
 from run import build_host, names_of, times, unpack
 
-from support.costs import table_row, table_scenes
+from supervessel import parse_scene
+from support.costs import table_raw, table_row
 
 
 def main() -> None:
@@ -14,7 +15,8 @@ def main() -> None:
     print("|---|---:|---:|---:|---:|---:|")
     with tempfile.TemporaryDirectory() as name:
         host = build_host("host", Path(name))
-        for number, (title, scene) in enumerate(table_scenes().items()):
+        for number, (title, raw) in enumerate(table_raw().items()):
+            scene = parse_scene(raw)
             folder = Path(name, str(number))
             folder.mkdir()
             library, description = unpack(scene, folder)

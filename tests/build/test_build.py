@@ -218,7 +218,8 @@ def test_the_compiler_keeps_its_files_where_supervessel_cache_says(tmp_path, mon
     home.mkdir()
     monkeypatch.setenv("SUPERVESSEL_CACHE", str(cache))
     monkeypatch.setenv("HOME", str(home))
-    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    for name in ("XDG_CACHE_HOME", "ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR"):
+        monkeypatch.delenv(name, raising=False)
     compile_library([source], host_platform(), tmp_path / "small.o", flags=("-c",))
     assert any(cache.iterdir())
     assert not any(home.iterdir())
@@ -231,7 +232,6 @@ def test_another_version_of_fmi_is_a_value_error(tmp_path):
 
 STRICT = (
     "-std=c99",
-    "-O2",
     "-Wall",
     "-Wextra",
     "-Wpedantic",
@@ -239,7 +239,8 @@ STRICT = (
     "-Wshadow",
     "-Wstrict-prototypes",
 )
-COMPILERS = {"gcc": ["gcc"], "zig": [sys.executable, "-m", "ziglang", "cc"]}
+COMPILERS = {"gcc": ["gcc", "-O2"], "zig": [sys.executable, "-m", "ziglang", "cc", "-O0"]}
+"""Warnings of gcc follow the flow of values, as it does when it optimises; those of zig's clang do not."""
 
 
 SHAPES = {
@@ -264,14 +265,14 @@ def test_the_hand_written_c_compiles_without_warnings(tmp_path, fmi, compiler, r
     sources = [path for path in sorted(LAYER.glob("*.c")) if not path.name.startswith(other)]
     assert len(sources) >= 6
     options = [*STRICT, "-Werror", f"-I{tmp_path}", f"-I{LAYER}", "-isystem", str(fmi_headers())]
-    for source in sources:
-        done = subprocess.run(
-            [*command, *options, "-c", str(source), "-o", str(tmp_path / "object.o")],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert (done.returncode, done.stderr) == (0, ""), source.name
+    done = subprocess.run(
+        [*command, *options, "-c", *map(str, sources)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_a_scene_without_inputs_and_outputs_compiles_for_both_versions(tmp_path):

@@ -245,7 +245,9 @@ def homeless(tmp_path_factory):
     folder, temporary = tmp_path_factory.mktemp("work"), tmp_path_factory.mktemp("temporary")
     (folder / "ball.toml").write_text(SCENE)
     home = folder / "ball.toml" / "home"
-    cleared = {"XDG_CACHE_HOME": None, "SUPERVESSEL_CACHE": None}
+    cleared = dict.fromkeys(
+        ("XDG_CACHE_HOME", "SUPERVESSEL_CACHE", "ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR")
+    )
     return run(folder, "ball.toml", HOME=home, TMPDIR=temporary, **cleared), folder, temporary
 
 

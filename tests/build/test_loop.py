@@ -1,6 +1,8 @@
 """The composite of many moving vessels: a loop in C, the same as the twin's straight code."""
 
 import ctypes
+import tempfile
+from functools import cache
 from pathlib import Path
 
 import casadi as ca
@@ -14,7 +16,7 @@ from fmu_build.platforms import host_platform
 from fmu_build.sources import source_files
 from supervessel import Scene, Twin, parse_scene
 from supervessel.equations import Equations, equations, p_start
-from support import EPS, ISS_DG, OK, flying, scene, variant
+from support import EPS, ISS_DG, OK, flying, scene, store, variant
 from support.costs import station
 
 VISIBLE = [flag for flag in FLAGS if flag not in ("-fvisibility=hidden", "-s")]
@@ -80,8 +82,13 @@ def _constant(header: str, name: str) -> str:
     )
 
 
+@cache
+def compiled_for(name: str) -> Compiled:
+    return Compiled(parse_scene(SCENES[name]), Path(tempfile.mkdtemp(dir=store())))
+
+
 @pytest.fixture(scope="module", params=SCENES)
-def both(request, tmp_path_factory) -> tuple[Compiled, Equations, np.ndarray]:
+def both(request) -> tuple[Compiled, Equations, np.ndarray]:
     """The loop, the straight code, and values of the inputs that are off the scene's."""
     scene = parse_scene(SCENES[request.param])
     model = equations(scene)
@@ -89,7 +96,7 @@ def both(request, tmp_path_factory) -> tuple[Compiled, Equations, np.ndarray]:
     start = p_start(scene)
     generator = np.random.default_rng(1)
     p = start * generator.uniform(0.9, 1.1, len(start)) + generator.uniform(-0.1, 0.1, len(start))
-    return Compiled(scene, tmp_path_factory.mktemp("loop")), model, p
+    return compiled_for(request.param), model, p
 
 
 def test_the_loop_gives_the_bits_of_the_straight_code(both):
@@ -102,12 +109,11 @@ def test_one_vessel_at_a_time_gives_the_same_bits(tmp_path):
     """As compilers without registers of several numbers take them."""
     scene = parse_scene(every_kind())
     p, count = p_start(scene), equations(scene).composite.numel_out(0)
-    found = []
-    for lanes in (1, LANES):
-        folder = tmp_path / str(lanes)
-        folder.mkdir()
-        found.append(Compiled(scene, folder, lanes)("composite", p, size=count))
-    np.testing.assert_array_equal(*found)
+    one, several = (
+        compiled("composite", p, size=count)
+        for compiled in (Compiled(scene, tmp_path, 1), compiled_for("every kind"))
+    )
+    np.testing.assert_array_equal(one, several)
 
 
 def test_forward_derivatives_of_the_loop_are_those_of_the_straight_code(both):

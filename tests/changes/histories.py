@@ -212,8 +212,8 @@ class ByReference:
 class ByFmu:
     """The FMU in co-simulation."""
 
-    def __init__(self, raw: Mapping[str, Any], fmi: int = 3) -> None:
-        self.instance = Instance(raw, fmi)
+    def __init__(self, raw: Mapping[str, Any], fmi: int = 3, *, optimised: bool = True) -> None:
+        self.instance = Instance(raw, fmi, optimised=optimised)
         assert self.instance.initialise() == OK, self.instance.log
 
     def set(self, inputs: Values) -> None:

@@ -32,7 +32,7 @@ class Flight:
         interface, self.mode = place.split()
         self.exchange, flown, rng = interface == "me", scene(raw), np.random.default_rng(0)
         options = {"eventModeUsed": True} if interface == "events" else {}
-        self.instance = Instance(raw, exchange=self.exchange, **options)
+        self.instance = Instance(raw, exchange=self.exchange, optimised=False, **options)
         values = start_values(flown)
         vectors = [f"{name}.{key}" for name in flown.inputs.motion for key in ("velocity", "rate")]
         vectors += [f"{name}.force" for name in flown.inputs.force]

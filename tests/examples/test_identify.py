@@ -6,7 +6,7 @@ import identify
 import numpy as np
 import pytest
 from identify import COUNT, EXAMPLES, NOISE, TRUTH, estimate, flown, model, pulses
-from scipy.stats import binom, chi2
+from scipy.special import bdtr, chdtri
 
 from fmu_build import build_fmu
 from supervessel import Twin, load_scene
@@ -55,10 +55,10 @@ def test_the_stated_covariance_covers_the_truth(twin, rates, truth, tmp_path):
         found, covariance = estimate(rates, truth, torque, clean + NOISE * rng.normal(size=clean.shape))
         off = found - truth
         squares.append(off @ np.linalg.solve(covariance, off))
-    low, high = chi2.ppf([0.005, 0.995], len(truth) * DRAWS)
+    low, high = chdtri(len(truth) * DRAWS, [0.995, 0.005])
     assert low < sum(squares) < high
-    inside = sum(np.array(squares) < chi2.ppf(0.95, len(truth)))
-    assert binom.ppf(1e-4, DRAWS, 0.95) <= inside
+    inside = sum(np.array(squares) < chdtri(len(truth), 0.05))
+    assert bdtr(inside, DRAWS, 0.95) >= 1e-4
 
 
 def test_a_poor_first_guess_finds_the_truth_where_there_is_no_noise(twin, rates, truth, tmp_path):

@@ -9,7 +9,7 @@ from fmpy import simulate_fmu
 from scipy.integrate import solve_ivp
 
 from supervessel import reference
-from support import EPS, ISS_DG, built, relative_error, scene, variant
+from support import EPS, ISS_DG, relative_error, scene, unpacked, variant
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
 LAWS = ("none", "decoupled", "principal", "tensor")
@@ -80,7 +80,7 @@ def signals() -> np.ndarray:
 
 @cache
 def flight(law: str, fmi: int, step: float = STEP, angle: float = ANGLE) -> np.ndarray:
-    path = built(raw_scene(law, max_angle_step=angle), fmi)
+    path = unpacked(raw_scene(law, max_angle_step=angle), fmi)
     return simulate_fmu(
         str(path), fmi_type="CoSimulation", stop_time=STOP, output_interval=step, input=signals()
     )
@@ -167,7 +167,7 @@ def test_both_versions_give_the_same_flight_bit_for_bit(law):
 @FMI
 def test_the_states_can_be_recorded_and_are_those_of_the_outputs(fmi):
     result = simulate_fmu(
-        str(built(raw_scene("tensor"), fmi)),
+        str(unpacked(raw_scene("tensor"), fmi)),
         stop_time=STOP,
         output_interval=STEP,
         input=signals(),
@@ -223,7 +223,7 @@ def test_start_values_of_inputs_and_parameters_give_the_flight_of_a_scene_that_h
         },
     )
     flights = [
-        simulate_fmu(str(built(raw, fmi)), stop_time=10.0, output_interval=STEP, start_values=values)
+        simulate_fmu(str(unpacked(raw, fmi)), stop_time=10.0, output_interval=STEP, start_values=values)
         for raw, values in ((raw_scene("tensor"), start_values), (with_them, {}))
     ]
     assert flights[0].tobytes() == flights[1].tobytes()
@@ -232,7 +232,7 @@ def test_start_values_of_inputs_and_parameters_give_the_flight_of_a_scene_that_h
 @pytest.mark.parametrize("start", [1e5, -3.0, -60.0])
 @FMI
 def test_fmpy_flies_from_any_start_time(fmi, start):
-    path = str(built(raw_scene("none"), fmi))
+    path = str(unpacked(raw_scene("none"), fmi))
     flown = simulate_fmu(path, start_time=start, stop_time=start + STOP, output_interval=STEP)
     assert len(flown) == round(STOP / STEP) + 1
     # STEP and all times are exact in binary, the steps are the same.
@@ -243,7 +243,7 @@ def test_fmpy_flies_from_any_start_time(fmi, start):
 @pytest.mark.parametrize("start", [0.0, 1e5, -3.0, -6.0])
 @FMI
 def test_fmpy_flies_to_its_stop_time_by_steps_that_are_not_exact(fmi, start):
-    path = str(built(raw_scene("none"), fmi))
+    path = str(unpacked(raw_scene("none"), fmi))
     flown = simulate_fmu(path, start_time=start, stop_time=start + 6.0, output_interval=0.1)
     assert len(flown) == 61
     # Times are sums and products of the start and 0.1, off by a few roundings of the largest.

@@ -17,10 +17,18 @@ FLAGS = ("-std=c99", "-O1", "-g", "-w", "-ffp-contract=off", "-fPIC", "-shared",
 SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer")
 
 
-def compile_binaries(
-    sources: Sequence[str], folder: Path, platforms: Sequence[Platform], fmi: int, model_identifier: str
+def compile_binaries(  # noqa: PLR0917
+    sources: Sequence[str],
+    folder: Path,
+    platforms: Sequence[Platform],
+    fmi: int,
+    model_identifier: str,
+    flags: Sequence[str] = (),
 ) -> dict[str, bytes]:
-    """Returns the library by archive path, as `fmu_build.compiler.compile_binaries` does for this machine."""
+    """Returns the library by archive path, as `fmu_build.compiler.compile_binaries` does for this machine.
+
+    flags : of the other compiler, for naught
+    """
     [platform] = platforms
     library = folder / f"{model_identifier}{platform.suffix}"
     command = [os.environ["SANITIZING_COMPILER"], *FLAGS, *SANITIZERS, "-isystem", str(fmi_headers())]

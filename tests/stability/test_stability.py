@@ -2,13 +2,14 @@
 
 import subprocess
 import sys
+import tempfile
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from fmpy import extract, read_model_description
+from fmpy import read_model_description
 
 from fmu_build.compiler import fmi_headers
 from fmu_build.platforms import host_platform
@@ -17,7 +18,7 @@ from stability.flights import TEMPLATE, Craft, U, craft, one_tensor, single
 from stability.pair import MASSES, pair, pair_case, pair_inertia, pair_truth
 from stability.runs import RUNS, Run, applies, flights, is_long, motion_problem, problem
 from supervessel import Twin
-from support import DISCARD, OK, built, scene, variant
+from support import DISCARD, OK, scene, store, unpacked, variant
 
 FREE = [name for name in truth.categories() if not name.startswith("torque")]
 DIAGONAL = [name for name in FREE if not name.endswith("full tensor")]
@@ -31,11 +32,6 @@ def answers(run: Run, category: str, long: bool) -> None:
         if found:
             wrong[case.name] = found
     assert not wrong, "\n".join(f"{name}: {what}" for name, what in wrong.items())
-
-
-@cache
-def unpacked(path: Path) -> tuple[str, Any]:
-    return extract(str(path)), read_model_description(str(path))
 
 
 def some(run: Run, category: str, long: bool) -> bool:
@@ -215,16 +211,17 @@ MOMENTUM = "kinetic_energy", "angular_momentum", "attitude"
     "inertia", [np.diag([1.0, 2.0, 2.5]), np.array(TEMPLATE)], ids=["diagonal", "full tensor"]
 )
 @pytest.mark.parametrize(("propagator", "tolerance"), [("exact", 0.0), ("auto", 0.0), ("taylor", 1e-15)])
-def test_a_million_steps_keep_momentum_and_energy(propagator, tolerance, inertia, tmp_path):
+def test_a_million_steps_keep_momentum_and_energy(propagator, tolerance, inertia):
     raw = variant(
         one_tensor(propagator, inertia),
         {"name": "long", "outputs.names": list(MOMENTUM), "rotation.angular_velocity": [0.3, 0.7, 0.5]},
     )
-    folder, description = unpacked(built(raw))
+    folder = unpacked(raw)
+    description = read_model_description(str(folder))
     references = {v.name: v.valueReference for v in description.modelVariables}
-    library = Path(folder) / "binaries" / host_platform().name / f"long{host_platform().suffix}"
+    library = folder / "binaries" / host_platform().name / f"long{host_platform().suffix}"
     first = [references[name] for name in ("attitude[1]", "angular_momentum[1]", "kinetic_energy")]
-    words = [build_host(tmp_path), library, description.guid, STEPS, STEP, tolerance, *first]
+    words = [build_host(), library, description.guid, STEPS, STEP, tolerance, *first]
     done = subprocess.run([str(word) for word in words], check=True, capture_output=True, text=True)
     energy, length, vector, attitude = map(float, done.stdout.split())
     assert energy <= 1e-12
@@ -234,9 +231,10 @@ def test_a_million_steps_keep_momentum_and_energy(propagator, tolerance, inertia
     assert attitude <= 4 * U
 
 
-def build_host(folder: Path) -> Path:
+@cache
+def build_host() -> Path:
     """Returns the program that takes the steps."""
-    program = folder / "long_run"
+    program = Path(tempfile.mkdtemp(dir=store())) / "long_run"
     command = [sys.executable, "-m", "ziglang", "cc", "-target", host_platform().target, "-std=gnu99", "-O2"]
     command += [
         "-isystem",

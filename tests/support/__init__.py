@@ -1,7 +1,9 @@
 """Shared by the tests: small scenes as dictionaries, FMUs built from them, instances driven through FMPy."""
 
 import copy
+import hashlib
 import json
+import os
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -10,12 +12,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fmpy import extract, read_model_description
+from fmpy import read_model_description
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 
 from fmu_build import build_fmu
+from fmu_build.build import compile_sources, generate
+from fmu_build.compiler import FLAGS, TRIAL_FLAGS
+from fmu_build.platforms import host_platform
+from fmu_build.sources import source_file_names, source_files
 from supervessel import Scene, parse_scene
 
 EPS = 2.0**-52
@@ -106,24 +112,59 @@ def body(mass: float = 1000.0, pmi: Sequence[float] = (1.0, 2.0, 2.5), **rotatio
 
 
 @cache
-def _built(text: str, fmi: int) -> Path:
-    folder = Path(tempfile.mkdtemp(prefix="supervessel-test-"))
-    return build_fmu(scene(json.loads(text)), folder / "scene.fmu", fmi)
+def store() -> Path:
+    """Returns a folder for what tests build: that of the session, which all of its processes share (see
+    tests/conftest.py), or outside of one a folder of this process."""
+    return Path(os.environ.get("SUPERVESSEL_TESTS") or tempfile.mkdtemp(prefix="supervessel-test-"))
 
 
 def built(raw: Mapping[str, Any], fmi: int = 3) -> Path:
-    """Returns the path of the FMU of a raw scene, built once for each test process."""
-    return _built(json.dumps(raw, sort_keys=True), fmi)
+    """Returns the path of the FMU of a raw scene, built once in a session."""
+    path = store() / f"{_digest(raw, fmi)}.fmu"
+    return path if path.exists() else build_fmu(scene(raw), path, fmi)
+
+
+def unpacked(raw: Mapping[str, Any], fmi: int = 3, *, optimised: bool = True) -> Path:
+    """Returns a folder with all of a raw scene's FMU that is loaded, made once in a session.
+
+    optimised : whether the library is that of `built`; else it is compiled in a fifth of the time. That of
+                FMI 2 never is: what both versions share is seen both ways.
+    Pictures and pages are left out.
+    """
+    optimised = optimised and fmi == 3
+    folder = store() / _digest([raw, optimised], fmi)
+    if folder.is_dir():
+        return folder
+    made, parsed = Path(tempfile.mkdtemp(dir=store())), scene(raw)
+    sources, description = generate(parsed, fmi)
+    packed, names = source_files(sources, fmi, parsed.name), source_file_names(sources, fmi)
+    flags = FLAGS if optimised else TRIAL_FLAGS
+    binaries = compile_sources(packed, names, fmi, [host_platform()], parsed.name, flags)
+    for path, content in {"modelDescription.xml": description, **packed, **binaries}.items():
+        file = made / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(content)
+    try:
+        made.rename(folder)
+    except OSError:
+        if not folder.is_dir():  # else another process was faster
+            raise
+    return folder
+
+
+def _digest(what: Any, fmi: int) -> str:
+    return hashlib.sha256(json.dumps([what, fmi], sort_keys=True).encode()).hexdigest()
 
 
 @cache
-def _unpacked(path: Path) -> tuple[str, Any]:
-    return extract(str(path)), read_model_description(str(path))
+def _description(folder: Path) -> Any:
+    return read_model_description(str(folder))
 
 
 class Instance:
     """An instance of a built FMU, of either version and interface, addressed by variable names.
 
+    optimised : see `unpacked`
     Each call returns the FMI status; `log` holds (status, category, message) of each line logged.
     """
 
@@ -134,16 +175,19 @@ class Instance:
         logging: bool = True,
         name: str = "it",
         exchange: bool = False,
+        *,
+        optimised: bool = True,
         **instantiation: Any,
     ) -> None:
-        folder, description = _unpacked(built(raw, fmi))
-        self.fmi, self.description = fmi, description
+        folder = unpacked(raw, fmi, optimised=optimised)
+        self.fmi, self.description = fmi, _description(folder)
+        description = self.description
         self.references = {v.name: v.valueReference for v in description.modelVariables}
         self.booleans = {v.name for v in description.modelVariables if v.type == "Boolean"}
         self.log: list[tuple[int, str, str]] = []
         arguments = {
             "guid": description.guid,
-            "unzipDirectory": folder,
+            "unzipDirectory": str(folder),
             "modelIdentifier": description.coSimulation.modelIdentifier,
             "instanceName": name,
         }
@@ -321,5 +365,7 @@ __all__ = [
     "random_rotation",
     "relative_error",
     "scene",
+    "store",
+    "unpacked",
     "variant",
 ]

@@ -9,7 +9,7 @@ import casadi as ca
 from fmu_build.build import compile_sources, generate
 from fmu_build.platforms import PLATFORMS
 from fmu_build.sources import source_file_names, source_files
-from supervessel import Scene, parse_scene
+from supervessel import Scene
 from supervessel.equations import equations
 from support import ISS_DG, body, variant
 
@@ -40,8 +40,8 @@ def _module(number: int) -> dict[str, Any]:
     return {"mass": 1000.0 + number, "pmi": [1.0, 1.2, 1.5], "ports": ports}
 
 
-def table_scenes() -> dict[str, Scene]:
-    """Returns the scenes of the table by the names of its rows, carried over a step by `rk4`."""
+def table_raw() -> dict[str, dict[str, Any]]:
+    """Returns the raw scenes of the table by the names of its rows, carried over a step by `rk4`."""
     ship = {"outputs": None, "inputs": {"mass": ["DG"], "torque": True}}
     both = {"mass": ["ISS", "DG"], "pmi": ["ISS", "DG"], "pose": ["ISS.P2", "DG.nose"], "torque": True}
     stack = tomllib.loads((EXAMPLES / "launch_stack.toml").read_text(encoding="utf-8"))
@@ -52,8 +52,7 @@ def table_scenes() -> dict[str, Scene]:
         "launch stack of seven parts, masses of four": variant(stack, {"outputs": None}),
         "station of 1000 vessels, masses of two": station(1000, ["v300", "v701"]),
     }
-    by_rk4 = {"rotation.propagator": "rk4"}
-    return {name: parse_scene(variant(tables, by_rk4)) for name, tables in raw.items()}
+    return {name: variant(tables, {"rotation.propagator": "rk4"}) for name, tables in raw.items()}
 
 
 def operations(function: ca.Function) -> int:

@@ -10,18 +10,30 @@ from pathlib import Path
 
 import pytest
 
+from fmu_build.compiler import compiler_cache
+
 ROOT = Path(__file__).parents[2]
 
 needs_posix = pytest.mark.skipif(os.name != "posix", reason="needs signals and ulimit")
 
 
-@pytest.fixture(scope="session", autouse=True)
+COMPILERS = ("b", "h", "o", "tmp", "z", "sources")
+"""Folders of a cache that are the compiler's."""
+
+
+@pytest.fixture(scope="module", autouse=True)
 def cache() -> Iterator[Path]:
-    """A cache in which nothing has been flown before, removed at the end: the compiler starts cold once."""
+    """A cache in which nothing has been flown before; what has been compiled before is in it, where the
+    system lets folders be linked."""
+    common = compiler_cache()
     with (
         pytest.MonkeyPatch.context() as patch,
         tempfile.TemporaryDirectory(prefix="supervessel-test-") as name,
     ):
+        if os.name == "posix":
+            for kind in COMPILERS:
+                (common / kind).mkdir(exist_ok=True)
+                Path(name, kind).symlink_to(common / kind)
         patch.setenv("SUPERVESSEL_CACHE", name)
         yield Path(name)
 
