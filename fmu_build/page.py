@@ -172,12 +172,20 @@ def _accuracy(evidence: Mapping[str, Any]) -> str:
         for one in evidence["candidates"]
     ]
     found += [
-        (_settings(one), one["operations"], "", "", "at least; dearer than the choice, not flown", 0, "")
+        (
+            _settings(one),
+            f"{one['operations']:g} at least",
+            "",
+            "",
+            "not flown: dearer, finer settings too",
+            0,
+            "",
+        )
         for one in evidence["dearer"]
     ]
     head = (
         "candidate",
-        "operations per step",
+        "operations per step, most in a flight",
         "attitude [rad]",
         "rate [rad/s]",
         "worst in",
@@ -187,7 +195,8 @@ def _accuracy(evidence: Mapping[str, Any]) -> str:
     excluded = "".join(f"<li>{escape(what)};</li>\n" for what in evidence["not_covered"])
     return (
         f"<h3>Accuracy</h3>\n<p>{escape(evidence['claim'])} Law and propagator are the cheapest, by counted "
-        "operations, whose flights keep the accuracy with the margin.</p>\n"
+        "operations, whose flights keep the accuracy with the margin. A candidate that is not enough is "
+        "broken off.</p>\n"
         f"{_table('', (), rows)}<p>Not covered:</p>\n<ul>\n{excluded}</ul>\n"
         + _table("Candidates: largest errors in flight", head, found)
     )

@@ -192,12 +192,31 @@ def test_histories_stay_in_their_ranges_and_reach_both_ends():
     assert len({history.name for history in every.flown}) == len(every.flown) > 15
 
 
+@pytest.mark.parametrize(("low", "high"), [(-TORQUE, 0.0), (0.0, TORQUE), (-TORQUE, 1.0)])
+def test_what_acts_one_way_alone_spins_a_body_up_from_rest(low, high):
+    """A sphere at rest: nothing but the larger end, which the rate then goes along with."""
+    changes = {"inputs.range": {"DG.mass": [11000.0, 24500.0], "torque": [low, high]}}
+    raw = variant(DOCKED, changes | {"rotation.angular_velocity": [0.0, 0.0, 0.0]})
+    scene = parse_scene(raw)
+    every = histories(scene, scene.accuracy, lambda inputs: np.ones(len(inputs.rows), dtype=bool), ball)
+    [spun] = [history for history in every.flown if history.name == "spun up 1"]
+    assert (spun.inputs.numbers[:, 1:] == max(low, high, key=abs)).all()
+
+
+def test_what_acts_pushes_against_the_rate_if_it_is_stronger_there():
+    changes = {"inputs.range": {"DG.mass": [11000.0, 24500.0], "torque": [-TORQUE, 1.0]}}
+    scene = parse_scene(variant(DOCKED, changes | {"rotation.angular_velocity": [1e-9, 1e-9, 1e-9]}))
+    every = histories(scene, scene.accuracy, lambda inputs: np.ones(len(inputs.rows), dtype=bool), ball)
+    [pushed] = [history for history in every.flown if history.name == "pushed, then spun up 1"]
+    assert (pushed.inputs.numbers[:, 1:] == -TORQUE).all()
+
+
 def test_rows_that_no_fmu_starts_with_are_left_out_and_counted():
     scene = parse_scene(DOCKED)
     every = histories(scene, scene.accuracy, lambda inputs: inputs.numbers[:, 1] <= 0.0, ball)
     assert every.senseless > every.drawn / 4
     for history in every.flown:
-        if not history.name.startswith(("spun", "corner 1, to and fro", "corner 2, to and fro")):
+        if not history.name.startswith(("spun", "pushed", "corner 1, to and fro", "corner 2, to and fro")):
             assert (history.inputs.numbers[:, 1] <= 0.0).all()
 
 

@@ -21,7 +21,23 @@ NOT_COVERED = (
     "model exchange, where the importer's solver integrates",
     "what the law tensor itself leaves out: parts that bend, propellant that sloshes; errors of the inputs",
     "inputs that make no sense in themselves, which the FMU discards",
+    "masses and poses that go to and fro, some keeping the rate and some the momentum, in just the order "
+    "that spins a body up with each round",
 )
+
+ABOUT = {
+    "asked, attitude, rate": "largest errors of the attitude [rad], of the rate [rad/s]; horizon, step: s",
+    "margin": "least of what is asked over the largest error in flight",
+    "doubt": "largest distance of the two ways to the exact motion, in truth",
+    "operations": "counted, of a communication step on an average over the flight in which it costs most",
+    "histories": "what inputs do in each flight",
+    "steps, looked_at": "communication steps of a flight, and at how many of their ends errors were taken",
+    "rows_drawn, rows_senseless": "values of all inputs that were drawn; those that the FMU discards",
+    "candidates": "in the order tried; one that is not enough, or refused, is broken off: flights says after "
+    "how many, worst names the history of its largest error",
+    "dearer": "not flown: this setting and any finer one take so many operations at least",
+    "max_angle_step": "rad",
+}
 
 
 def choose(scene: Scene, progress: Progress = lambda _: None) -> tuple[Scene, dict[str, Any]]:
@@ -78,6 +94,7 @@ def _chosen(scene: Scene, accuracy: Accuracy, progress: Progress) -> dict[str, A
         raise AccuracyError(_refusal(search, accuracy))
     course, (attitude, rate) = search.every.course, search.doubt
     return {
+        "about": ABOUT,
         "scene": scene.name,
         "asked": accuracy.model_dump(mode="json"),
         "claim": CLAIM,
@@ -108,7 +125,7 @@ def _chosen(scene: Scene, accuracy: Accuracy, progress: Progress) -> dict[str, A
             for one in search.tried.values()
         ],
         "dearer": [
-            _settings(choice) | {"operations": _brief(at_least)} for choice, at_least in search.left.items()
+            _settings(choice) | {"operations": _brief(at_least)} for choice, at_least in search.left.values()
         ],
     }
 
@@ -152,5 +169,6 @@ def said(evidence: Mapping[str, Any]) -> str:
     found = f"{evidence['attitude']:.1e} rad of {asked['attitude']:g} rad"
     if asked["rate"] is not None:
         found += f", {evidence['rate']:.1e} rad/s of {asked['rate']:g} rad/s"
-    flown = f"largest error in {len(evidence['histories'])} flights of {asked['horizon']:g} s"
+    count = len(evidence["histories"])
+    flown = f"largest error in {count} flight{'s' * (count > 1)} of {asked['horizon']:g} s"
     return f"{settings}: {flown} {found}"

@@ -50,6 +50,9 @@ SPUN = 64
 SPUN_PIECES, SPUN_ANGLE = 200, 0.3
 """Pieces of a history that spins the body up, and the angle [rad] of steps by which it is foretold."""
 
+PUSHED = SPUN_PIECES // 4
+"""First pieces in which what acts does so at its larger ends, whatever the rate, in some of these."""
+
 TELLING = ("all high", "corner 1 held", "corner 2 held", "corner, 30 pieces")
 """Histories that are flown first: a law that will not do mostly shows it in these."""
 
@@ -163,7 +166,9 @@ def histories(scene: Scene, accuracy: Accuracy, judge: Judge, body: Body) -> His
         if columns.acting.any():
             starts = (columns.start, *_easiest(columns, corners[:SPUN], body))
             flown += [
-                _spun_up(f"spun up {i}", columns, course, scene, row, body) for i, row in enumerate(starts, 1)
+                _spun_up(f"{what} {i}", columns, course, scene, row, body, pushed)
+                for what, pushed in (("spun up", 0), ("pushed, then spun up", PUSHED))
+                for i, row in enumerate(starts, 1)
             ]
     if experiment.size and fits[4].all():
         flown.append(History("as in the experiment", columns.inputs(np.arange(course.steps), experiment)))
@@ -242,17 +247,23 @@ def _easiest(columns: _Columns, corners: Array, body: Body) -> list[Array]:
 
 
 def _spun_up(  # noqa: PLR0913, PLR0917
-    name: str, columns: _Columns, course: Course, scene: Scene, row: Array, body: Body
+    name: str, columns: _Columns, course: Course, scene: Scene, row: Array, body: Body, pushed: int
 ) -> History:
-    """Returns a history in which what acts does so with the rate, as it is foretold by steps of rk4."""
+    """Returns a history in which what acts does so with the rate, as it is foretold by steps of rk4.
+
+    pushed : so many pieces begin it in which each input is at its larger end; so it is at no rate at all
+    """
     split = len(columns.numbers)
+    low, high = columns.low[columns.acting], columns.high[columns.acting]
+    larger = np.where(np.abs(low) > np.abs(high), low, high)
     inertia, gains = body(row[:split], row[split:])
     inverse = np.linalg.inv(inertia)
     omega = np.array(scene.rotation.angular_velocity)
     starts = np.unique(np.linspace(0, course.steps, SPUN_PIECES, endpoint=False).astype(np.int64))
     rows = np.tile(row, (len(starts), 1))
     for i, count in enumerate(np.diff(np.append(starts, course.steps))):
-        acts = np.where(omega @ gains >= 0.0, columns.high[columns.acting], columns.low[columns.acting])
+        along = np.zeros(len(low)) if i < pushed else omega @ gains
+        acts = np.where(along == 0.0, larger, np.where(along > 0.0, high, low))
         rows[i, columns.acting] = acts
         push, span = gains @ acts, float(count) * course.size
         angle = float(np.linalg.norm(omega) + np.linalg.norm(push) * span) * span

@@ -50,7 +50,7 @@ class Errors:
 class Tried:
     """A candidate and what came of it.
 
-    operations     : of a communication step, on an average over the history in which it costs most
+    operations     : of a communication step, on an average over the flight in which it costs most
     attitude, rate : largest errors [rad], [rad/s], what is not known of the truth included
     worst          : history of the largest error of the attitude
     flights        : how many histories were flown; not all where the first ones were enough to tell
@@ -121,6 +121,11 @@ def _two_digits(angle: float) -> float:
     return float(f"{floor(angle / unit * (1.0 + 1e-12)) * unit:.2g}")
 
 
+def _coarser(one: Choice, other: Choice) -> bool:
+    """Returns whether of two settings of a way the first is the coarser one."""
+    return (one.angle or 0.0, one.tolerance or 0.0) > (other.angle or 0.0, other.tolerance or 0.0)
+
+
 @dataclass
 class Search:
     """The candidates of a scene, tried one after the other.
@@ -128,8 +133,8 @@ class Search:
     truth     : samples of each history, (n, samples, 7)
     doubt     : how far two ways to them are apart, (n,) each: attitude [rad], rate [rad/s]
     sub_steps : of the first of these ways, in each history
-    left      : ways to propagate a model that at some setting, and finer, are dearer than the best whatever
-                comes of them, with their least operations
+    left      : by way to propagate a model the coarsest setting that is dearer than the best whatever comes
+                of it, and finer ones with it; and its least operations
     """
 
     scene: Scene
@@ -141,7 +146,7 @@ class Search:
     doubt: tuple[Array, Array]
     sub_steps: list[int]
     tried: dict[Choice, Tried] = field(default_factory=dict)
-    left: dict[Choice, float] = field(default_factory=dict)
+    left: dict[Choice, tuple[Choice, float]] = field(default_factory=dict)
     models: dict[Choice, Equations] = field(default_factory=dict)
     costs: dict[tuple[Choice, float | None], Costs] = field(default_factory=dict)
 
@@ -210,7 +215,8 @@ class Search:
     def _leave(self, choice: Choice, at_least: float) -> None:
         """Notes that a way to propagate a model, at this setting or finer, is dearer than the best."""
         way = Choice(choice.model, choice.propagator)
-        self.left[way] = min(at_least, self.left.get(way, np.inf))
+        if way not in self.left or _coarser(choice, self.left[way][0]):
+            self.left[way] = choice, at_least
 
     def _by_tolerance(self, model: Model, name: str) -> None:
         """Finds the largest tolerance that will do, then smaller ones while they are cheaper.
