@@ -15,6 +15,7 @@ from fmu_build.loop import Tables, loop_constants
 from fmu_build.table import Entry
 from supervessel.equations import Equations
 from supervessel.propagators.free_motion import FIRST_ANGLE, LARGEST_TURN
+from supervessel.propagators.theta import CONSTANTS
 from supervessel.scene import Scene
 from supervessel.variables import InputVariable
 
@@ -94,6 +95,7 @@ def scene_header(
         "AXES_SERIES": model.axes_slices.get("series", slice(0)).start or 0,
         "FREE_VARYING": begun[0].numel_out(0) if begun else 0,
         "FREE_CONSTANT": begun[0].numel_out(1) if begun else 0,
+        "FREE_START": CONSTANTS,
         "COMPOSITE_MASS": where["mass"].start,
         "COMPOSITE_INERTIA": where["inertia"].start,
         "COMPOSITE_MARGINS": where["margins"].start,

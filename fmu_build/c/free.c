@@ -1,5 +1,6 @@
 #include <float.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "instance.h"
@@ -122,6 +123,45 @@ Status free_motion(Instance *instance, const double x[], double time, double nex
         status = free_piece(instance, next, &left, piece == MOST_PIECES);
     return status;
 }
+
+#if FREE == FREE_ALWAYS || FREE == FREE_WHILE_FREE
+
+/* By which rates may have to be divided for free_at: beyond, its constants would be no normal doubles. */
+enum { LARGEST_EXPONENT = 900 };
+
+static bool all_finite(const double values[], size_t count) {
+    bool finite = true;
+    for (size_t i = 0; i < count; i++) finite = finite && isfinite(values[i]);
+    return finite;
+}
+
+/* Makes now.from_epoch. Returns whether it serves. */
+static bool find_constants(Instance *instance) {
+    Dynamics *now = &instance->now;
+    composite_refresh_axes(instance);
+    const Scaled scaled = scale(instance, now->epoch, 0.0);
+    if (has_tiny_rate(&scaled) || abs(scaled.exponent) > LARGEST_EXPONENT) return false;
+    const double unit = ldexp(1.0, scaled.exponent);
+    instance->arg[0] = scaled.x;
+    instance->arg[1] = scaled.a;
+    instance->arg[2] = &unit;
+    instance->res[0] = now->from_epoch;
+    free_constants(instance->arg, instance->res, instance->iw, instance->w, 0);
+    return all_finite(now->from_epoch, FREE_START);
+}
+
+Status free_motion_from_epoch(Instance *instance, double time, double next[]) {
+    Dynamics *now = &instance->now;
+    if (now->epoch_step == EPOCH_NEW) now->epoch_step = find_constants(instance) ? EPOCH_SERVED : EPOCH_DOUBLED;
+    if (now->epoch_step == EPOCH_DOUBLED) return free_motion(instance, now->epoch, time, next);
+    instance->arg[0] = now->from_epoch;
+    instance->arg[1] = &time;
+    instance->res[0] = next;
+    free_at(instance->arg, instance->res, instance->iw, instance->w, 0);
+    return STATUS_OK;
+}
+
+#endif
 
 #else
 

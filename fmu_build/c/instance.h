@@ -56,6 +56,10 @@ typedef void (*LogWriter)(const Instance *instance, Status status, const char *c
    early, at *end [s] or as soon as possible after it. */
 typedef bool (*SubStepListener)(Instance *instance, double *end);
 
+/* How a step goes on that is counted from an epoch: by free_motion, as the first one did, or by free_at. The first of
+   them finds out which; an epoch that no step goes on from, as where torque acts again, costs nothing more. */
+typedef enum { EPOCH_NEW, EPOCH_SERVED, EPOCH_DOUBLED } EpochStep;
+
 /* All that a saved state holds. The doubles come first: there is no padding but at the end, and that stays zero. */
 typedef struct {
     double values[VARIABLE_COUNT];    /* by value reference: time, inputs, parameters, outputs, states, rates */
@@ -77,6 +81,9 @@ typedef struct {
     double stepped_p[INPUT_P_COUNT + 1]; /* p of the last communication step or event, at first of the start */
     double epoch[STATE_COUNT];        /* the state that free motion is counted from */
     double elapsed, elapsed_rest;     /* s since then, as an unevaluated sum */
+#if FREE == FREE_ALWAYS || FREE == FREE_WHILE_FREE
+    double from_epoch[FREE_START];    /* what free_at needs of the epoch, if epoch_step is EPOCH_SERVED */
+#endif
     unsigned state;                   /* a State */
     unsigned model_exchange;          /* else co-simulation */
 #if CHANGES
@@ -86,6 +93,9 @@ typedef struct {
     unsigned composite_is_current;    /* p and c follow from the inputs as they are */
     unsigned axes_are_current;        /* a follows from c */
     unsigned epoch_holds;             /* the motion has been free since epoch, with stepped_p */
+#if FREE == FREE_ALWAYS || FREE == FREE_WHILE_FREE
+    unsigned epoch_step;              /* an EpochStep */
+#endif
 } Dynamics;
 
 /* Small changes of, or weights on, what the model's functions take and give. */
@@ -251,6 +261,11 @@ bool free_reaches(const double x[], double time);
 
 /* Carries a state on by a time [s] of motion without torque. */
 Status free_motion(Instance *instance, const double x[], double time, double next[]);
+
+#if FREE == FREE_ALWAYS || FREE == FREE_WHILE_FREE
+/* The same from now.epoch, at a small cost from its second time on. */
+Status free_motion_from_epoch(Instance *instance, double time, double next[]);
+#endif
 
 /* derivatives.c: partial derivatives of outputs and rates by inputs and states, at what the outputs are now;
    in INITIALIZATION of outputs, states and rates by inputs and parameters. Forward: sensitivity of unknowns to a

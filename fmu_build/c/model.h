@@ -35,6 +35,8 @@ int free_phase(const double **arg, double **res, int *iw, double *w, int mem);  
 int free_start(const double **arg, double **res, int *iw, double *w, int mem);        /* x, a, t, share -> v, k */
 int free_double(const double **arg, double **res, int *iw, double *w, int mem);       /* v, k -> v */
 int free_finish(const double **arg, double **res, int *iw, double *w, int mem);       /* x, a, t, v, k -> x */
+int free_constants(const double **arg, double **res, int *iw, double *w, int mem);    /* x, a, scale -> k */
+int free_at(const double **arg, double **res, int *iw, double *w, int mem);           /* k, t -> x */
 
 /* Of these a scene has those whose composite is a loop; see supervessel/kernels.py. */
 int loop_hang_forward(const double **arg, double **res, int *iw, double *w, int mem);

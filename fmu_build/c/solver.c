@@ -362,9 +362,13 @@ static Status free_step(Instance *instance, Progress *progress) {
     const bool goes_on =
         now->epoch_holds && !progress->composite_changed && free_reaches(now->epoch, elapsed + rest);
     if (!goes_on) elapsed = progress->h, rest = 0.0;
-    const Status status = free_motion(instance, goes_on ? now->epoch : x, elapsed + rest, next);
+    const Status status = goes_on ? free_motion_from_epoch(instance, elapsed + rest, next)
+                                  : free_motion(instance, x, elapsed + rest, next);
     if (status != STATUS_OK) return status;
-    if (!goes_on) memcpy(now->epoch, x, sizeof now->epoch);
+    if (!goes_on) {
+        memcpy(now->epoch, x, sizeof now->epoch);
+        now->epoch_step = EPOCH_NEW;
+    }
     now->elapsed = elapsed;
     now->elapsed_rest = rest;
     now->epoch_holds = true;

@@ -24,7 +24,7 @@ from supervessel.interrupts import interrupt_afterwards
 from supervessel.principal import principal, principal_forward, quaternion
 from supervessel.propagators import PROPAGATORS, Plan, plan_of
 from supervessel.propagators.bound import fastest_square
-from supervessel.propagators.exact import free_functions
+from supervessel.propagators.exact import free_functions, free_functions_of_start
 from supervessel.propagators.method import Motion
 from supervessel.quantities import EPSILON
 from supervessel.rotation import LAWS, principal_products
@@ -203,6 +203,8 @@ def equations(scene: Scene) -> Equations:
     rate_square, step, propagation, exponent = _steps(scene, plan, motion, parts, spin, u, c)
     if plan.free != "never":
         propagation += free_functions(a.numel(), slices["free"])
+    if plan.free in ("always", "while free"):
+        propagation += free_functions_of_start(a.numel(), slices["free"])
 
     def outputs_from(x: ca.SX) -> ca.SX:
         shown = a[slices["principal"]] if "principal" in slices else ca.SX.zeros(7)

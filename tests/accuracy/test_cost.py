@@ -10,7 +10,7 @@ import pytest
 from fmu_build.compiler import TRIAL_FLAGS, compile_library
 from fmu_build.platforms import host_platform
 from fmu_build.sources import LAYER
-from supervessel.accuracy.cost import free_operations, operations, series_operations
+from supervessel.accuracy.cost import free_operations, free_spans, operations, series_operations
 
 HERE = Path(__file__).parent
 
@@ -50,5 +50,20 @@ def test_slow_operations_count_as_several_and_moves_as_none():
 
 
 def test_a_doubling_of_free_motion_is_a_small_part_of_it():
-    whole, doubling = free_operations()
-    assert 50 < doubling < whole / 5
+    free = free_operations()
+    assert 50 < free.doubling < free.once / 5
+
+
+def test_free_motion_from_a_start_that_has_been_stepped_from_is_a_small_part_of_one_that_has_not():
+    free = free_operations()
+    assert free.again < free.once / 3
+    # what is found once pays for itself in two steps, each beyond the first angle
+    assert free.start + 2 * free.again < 2 * (free.once + free.doubling)
+
+
+def test_steps_of_free_motion_are_told_apart_by_where_they_start():
+    lengths, still, jumped = (4, 3, 5, 1), (True, True, True, False), (False, True, False, False)
+    assert free_spans(lengths, still, jumped, in_jumps=True) == [4, 8]
+    assert free_spans(lengths, still, jumped, in_jumps=False) == [4, 7]
+    assert free_spans((1, 1, 2), (True, False, True), (False, False, False), in_jumps=False) == [1, 2]
+    assert free_spans((1, 1), (True, True), (False, True), in_jumps=False) == [1]

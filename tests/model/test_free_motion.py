@@ -1,4 +1,4 @@
-"""The exact step of free rotation: values, sign, derivatives, cost.
+"""The exact step of free rotation, by doublings and by theta functions: values, sign, derivatives, cost.
 
 Truth is Euler's equations and the attitude's, integrated by Taylor series to 45 digits; over spans too long
 for that, closed forms of steady spins and of symmetric bodies at 50 digits.
@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from supervessel.propagators import free_motion
+from supervessel.propagators import free_motion, theta
 from support import EPS, series
 
 Array = NDArray[np.float64]
@@ -103,13 +103,17 @@ def conditions(truth: Truth, case: Case, varied: tuple[int, ...]) -> tuple[mp.mp
 
 
 def units(truth: Truth, case: Case, varied: tuple[int, ...] = tuple(range(7))) -> float:
-    """Returns the greater of the errors of attitude and rate, over u (1 + cond)."""
+    """Returns the greatest of the errors of attitude and rate, by either way, over u (1 + cond)."""
     with mp.workdps(55):
         right = truth([mp.mpf(x) for x in (*case[0], *case[1], case[2])])
         attitude, rate = conditions(truth, case, varied)
-        errors = [abs(mp.mpf(float(a)) - b) for a, b in zip(value(case), right, strict=True)]
-        relative = max(errors[4:]) / max(map(abs, right[4:]))
-        return float(max(max(errors[:4]) / (1 + attitude), relative / (1 + rate)) / U)
+        worst = mp.mpf(0)
+        for found in (value(case), from_start(case)):
+            if found is not None:
+                errors = [abs(mp.mpf(float(a)) - b) for a, b in zip(found, right, strict=True)]
+                relative = max(errors[4:]) / max(map(abs, right[4:]))
+                worst = max(worst, max(errors[:4]) / (1 + attitude), relative / (1 + rate))
+        return float(worst / U)
 
 
 # What is tested
@@ -122,6 +126,21 @@ def step(room: int = ROOM) -> ca.Function:
 
 def value(case: Case) -> Array:
     return np.array(step()(*case)).ravel()
+
+
+@cache
+def thetas() -> tuple[ca.Function, ca.Function]:
+    """Returns what is found of a start, and what follows at a time."""
+    state, k = ca.vertcat(1.0, 0.0, 0.0, 0.0, W), ca.SX.sym("k", theta.CONSTANTS)
+    found = theta.constants(state, J, ca.SX.eye(3), ca.SX(1.0))
+    return ca.Function("found", [J, W], [found]), ca.Function("at", [k, T], [theta.at(k, T)])
+
+
+def from_start(case: Case) -> Array | None:
+    """Returns turn and rates at the end by theta functions, if they serve."""
+    found, at = thetas()
+    k = np.array(found(*case[:2])).ravel()
+    return np.array(at(k, case[2])).ravel() if np.all(np.isfinite(k)) else None
 
 
 @cache
@@ -227,6 +246,87 @@ def test_error_of_steady_spins(name: str, axis: int, rate: float, span: float) -
     assert units(spinning, case, (3 + axis, 6)) <= BOUND
 
 
+def test_theta_functions_serve_all_but_what_is_near_the_separatrix() -> None:
+    for name, moments in BODIES.items():
+        assert from_start((moments, (0.1, 0.2, -0.8), 1.0)) is not None, name
+        assert from_start((moments, (0.0, 0.0, -0.8), 1.0)) is not None, name
+        assert from_start((moments, (0.6, 0.0, 0.0), 1.0)) is not None, name
+    for name, case in FURTHER.items():
+        assert from_start(case) is None, name
+
+
+def nearest_to_the_separatrix(below: float, above: float) -> tuple[float, float]:
+    """Returns neighbouring rates about axis 2 of GENERAL of which theta functions serve the first alone."""
+    while nextafter(below, above) != above:
+        middle = 0.5 * (below + above)
+        served = from_start((GENERAL, (0.3, 0.5, middle), 1.0)) is not None
+        below, above = (middle, above) if served else (below, middle)
+    return below, above
+
+
+@pytest.mark.parametrize("far", [0.0, 0.9])
+def test_error_where_theta_functions_just_serve(far: float) -> None:
+    rate, _ = nearest_to_the_separatrix(far, 0.3 * SEPARATRIX)
+    case = (GENERAL, (0.3, 0.5, rate), 9.0)
+    m = parameter(case)
+    k = mp.qfrom(m=m)
+    assert 0.9 * theta.LARGEST_NOME < k <= theta.LARGEST_NOME * (1 + 64 * U)
+    assert units(taylor, case) <= BOUND
+
+
+def parameter(case: Case) -> mp.mpf:
+    """Returns the parameter m of the Jacobi functions of a motion."""
+    J0, J1, J2 = map(mp.mpf, case[0])
+    a, b, c = (mp.mpf(x) ** 2 for x in case[1])
+    G, H = J0 * (J2 - J0) * a + J1 * (J2 - J1) * b, J1 * (J1 - J0) * b + J2 * (J2 - J0) * c
+    m = G * (J1 - J0) / (H * (J2 - J1))
+    return m if m <= 1 else 1 / m
+
+
+@pytest.mark.parametrize("name", ["general", "flat", "slender", "oblate but for one ulp"])
+def test_rates_that_stay_small_are_right_in_themselves(name: str) -> None:
+    """Against their own greatest values; the quotient of a rate has no sum with others' roundings."""
+    moments = BODIES[name]
+    rates = (1e-9, 2e-6, 0.8)
+    J0, J1, J2 = moments
+    ratio = (J2 - J1) / (J2 - J0) * (J1 / J0)  # of the squares of the two small rates' amplitudes
+    with mp.workdps(55):
+        case = (moments, rates, 7.0)
+        right = taylor([mp.mpf(x) for x in (*moments, *rates, 7.0)])[4:]
+        found = from_start(case)
+        assert found is not None
+        greatest = sqrt(rates[0] ** 2 + ratio * rates[1] ** 2)
+        for i, most in enumerate((greatest, greatest / sqrt(ratio), 0.8)):
+            # the phase goes with 2 sqrt(A) at the most in what is flown here: it is u of that, twice
+            assert abs(found[4 + i] - right[i]) <= BOUND * U * (1 + 2 * phase_of(case)) * most
+
+
+def phase_of(case: Case) -> float:
+    return float(ca.Function("f", [], [free_motion.phase(*(ca.SX(x) for x in case))])()["o0"])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_both_ways_agree_for_random_bodies_at_many_times(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    served = 0
+    for _ in range(25):
+        moments = np.sort(random.uniform(0.05, 1.0, 3))
+        moments[2] = min(moments[2], moments[0] + moments[1])
+        moments *= 0.75 / moments[2]
+        rates = random.normal(size=3) * 10.0 ** random.uniform(-6.0 * (seed % 2), 0.0, 3)
+        rates *= 0.75 / np.abs(rates).max()
+        for span in 10.0 ** random.uniform(-3.0, 1.5, 8) * random.choice([-1.0, 1.0], 8):
+            case = tuple(moments), tuple(rates), float(span)
+            found = from_start(case)
+            if found is None:
+                continue
+            served += 1
+            slack = 2 * BOUND * U * (1 + growth(case))
+
+            assert np.abs(found - value(case)).max() <= slack
+    assert served > 150
+
+
 def test_rest_stays() -> None:
     for moments in BODIES.values():
         assert value((moments, (0.0, 0.0, 0.0), 1e9)).tolist() == [1.0, 0, 0, 0, 0, 0, 0]
@@ -307,6 +407,11 @@ def test_sign_is_continuous_in_time(name: str, rates: str) -> None:
     turns = np.array(step().map(times.size)(BODIES[name], RATES[rates], times[None, :]))[:4]
     assert np.abs(np.diff(turns)).max() <= 0.08
     assert turns[:, 400].tolist() == [1.0, 0.0, 0.0, 0.0]
+    found, at = thetas()
+    k = found(BODIES[name], RATES[rates])
+    if np.all(np.isfinite(np.array(k))):
+        others = np.array(at.map(times.size)(k, times[None, :]))[:4]
+        assert np.abs(others - turns).max() <= 1e-12
 
 
 # Parts

@@ -152,9 +152,12 @@ def refusal_problem(run: Run, case: Case, end: End) -> str | None:
     return None
 
 
-def flights(run: Run, category: str, *, long: bool) -> Iterator[tuple[Case, End, Craft]]:
-    """Yields the cases of a category with their ends, those that take long or the others."""
+def flights(run: Run, category: str, *, long: bool, parts: int = 1) -> Iterator[tuple[Case, End, Craft]]:
+    """Yields the cases of a category with their ends, those that take long or the others.
+
+    parts : communication steps of a case
+    """
     for case in truth.cases(category):
         if applies(run, case) and is_long(run, case) == long:
             flown = craft(run.propagator, case.full)
-            yield case, flown.fly(case, run.tolerance), flown
+            yield case, flown.fly(case, run.tolerance, parts), flown

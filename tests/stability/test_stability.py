@@ -24,10 +24,10 @@ FREE = [name for name in truth.categories() if not name.startswith("torque")]
 DIAGONAL = [name for name in FREE if not name.endswith("full tensor")]
 
 
-def answers(run: Run, category: str, long: bool) -> None:
+def answers(run: Run, category: str, long: bool, parts: int = 1) -> None:
     """Flies a category; nothing may be wrong."""
     wrong = {}
-    for case, end, _ in flights(run, category, long=long):
+    for case, end, _ in flights(run, category, long=long, parts=parts):
         found = problem(run, case, end)
         if found:
             wrong[case.name] = found
@@ -58,11 +58,26 @@ def test_a_long_step_is_right_or_refused(run, category):
     answers(run, category, long=True)
 
 
+@pytest.mark.parametrize("parts", [2, 8])
+@pytest.mark.parametrize("category", FREE)
+def test_exact_motion_in_several_steps_is_as_right_as_in_one(category, parts):
+    """From the second step on theta functions serve where the nome lets them."""
+    answers(Run("exact"), category, long=False, parts=parts)
+
+
+def test_theta_functions_serve_most_of_the_reference_cases():
+    """The control for the test above: two steps have other bits than the one they come to."""
+    cases = [case for name in FREE for case in truth.cases(name) if case.time]
+    ends = [[craft("exact", case.full).fly(case, parts=n).state.tobytes() for n in (1, 2)] for case in cases]
+    assert sum(one != two for one, two in ends) > 0.7 * len(cases)
+
+
+@pytest.mark.parametrize("parts", [1, 2])
 @pytest.mark.parametrize("category", DIAGONAL)
-def test_exact_motion_of_a_diagonal_body_is_as_right_as_its_motion_allows(category):
+def test_exact_motion_of_a_diagonal_body_is_as_right_as_its_motion_allows(category, parts):
     found = [
         (case.name, motion_problem(case, end))
-        for case, end, _ in flights(Run("exact"), category, long=False)
+        for case, end, _ in flights(Run("exact"), category, long=False, parts=parts)
         if not case.full
     ]
     assert not [pair for pair in found if pair[1]]
@@ -71,8 +86,9 @@ def test_exact_motion_of_a_diagonal_body_is_as_right_as_its_motion_allows(catego
 @pytest.mark.parametrize("category", FREE)
 def test_auto_without_torque_gives_the_bits_of_exact(category):
     for case in truth.cases(category):
-        one, other = (craft(propagator, case.full).fly(case) for propagator in ("auto", "exact"))
-        assert one.state.tobytes() == other.state.tobytes(), case.name
+        for parts in (1, 2):
+            one, other = (craft(name, case.full).fly(case, parts=parts) for name in ("auto", "exact"))
+            assert one.state.tobytes() == other.state.tobytes(), case.name
 
 
 def test_a_flight_of_a_span_of_no_time_is_the_start():

@@ -3,6 +3,7 @@
 What every candidate does alike, inputs set and outputs got, is left out.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from math import ceil, log2
@@ -13,7 +14,7 @@ import numpy as np
 from supervessel.accuracy.histories import Histories, History
 from supervessel.equations import Equations
 from supervessel.interrupts import interrupt_afterwards
-from supervessel.propagators.exact import free_functions
+from supervessel.propagators.exact import free_functions, free_functions_of_start
 from supervessel.propagators.free_motion import FIRST_ANGLE
 from supervessel.propagators.taylor import taylor_order
 from supervessel.rotation import LAWS
@@ -33,21 +34,35 @@ TURNS = 60
 
 
 @dataclass(frozen=True)
+class FreeCosts:
+    """Operations of free motion, the same in every scene.
+
+    once     : without doublings
+    doubling : of a doubling
+    start    : of what is found once where a second step goes on from the start of a first
+    again    : of every step from then on, where the nome lets it be taken so (all but near the separatrix)
+    """
+
+    once: int
+    doubling: int
+    start: int
+    again: int
+
+
+@dataclass(frozen=True)
 class Costs:
     """Operations of one library at one tolerance.
 
     sub_step : of a sub-step that is no free motion
     begun    : of what comes before the sub-steps of a communication step
     changed  : of a change of inputs that shape the composite
-    free     : of free motion, without doublings
-    doubling : of a doubling
+    free     : of free motion
     """
 
     sub_step: int
     begun: int
     changed: int
-    free: int
-    doubling: int
+    free: FreeCosts
 
 
 def operations(function: ca.Function) -> int:
@@ -57,10 +72,11 @@ def operations(function: ca.Function) -> int:
 
 
 @cache
-def free_operations() -> tuple[int, int]:
-    """Returns the operations of free motion without doublings, and of a doubling; the same in every scene."""
+def free_operations() -> FreeCosts:
+    """Returns the operations of free motion."""
     phase, start, double, finish = map(operations, free_functions(12, slice(0, 12)))
-    return phase + start + finish, double
+    constants, at = map(operations, free_functions_of_start(12, slice(0, 12)))
+    return FreeCosts(phase + start + finish, double, constants, at)
 
 
 def series_operations(order: int, *, gyroscopic: bool, turned: bool) -> int:
@@ -80,7 +96,7 @@ def costs(model: Equations, law: Law, tolerance: float) -> Costs:
     count = {f.name(): operations(f) for f in (*model.propagation, *model.changing)}
     changing = (f.name() for f in model.changing if not f.name().endswith(("_forward", "_reverse")))
     changed = operations(model.composite) + operations(model.axes) + sum(count[name] for name in changing)
-    free, doubling = free_operations()
+    free = free_operations()
     control = model.plan.method.control if model.plan.method else ""
     sub_step = count.get("step", 0) + count.get("fastest_square", 0)
     begun = operations(model.ode) + POWER if control in ("error", "series") else 0
@@ -91,8 +107,8 @@ def costs(model: Equations, law: Law, tolerance: float) -> Costs:
         turned, gyroscopic = model.product_count > 3, LAWS[law].gyroscopic_term
         sub_step = POWER + series_operations(taylor_order(tolerance), gyroscopic=gyroscopic, turned=turned)
     if model.plan.free == "between kicks":
-        sub_step, begun = sub_step + count["step"] + free, 0
-    return Costs(sub_step, begun, changed, free, doubling)
+        sub_step, begun = sub_step + count["step"] + free.once, 0
+    return Costs(sub_step, begun, changed, free)
 
 
 def per_step(  # noqa: PLR0913, PLR0917
@@ -107,22 +123,38 @@ def per_step(  # noqa: PLR0913, PLR0917
     course, inputs = every.course, history.inputs
     shape = np.column_stack([inputs.numbers[:, ~every.acting], inputs.booleans])
     jumps = inputs.rows[1:][np.any(np.diff(shape, axis=0) != 0.0, axis=1)]
-    free_steps, span = 0, course.duration
-    if free == "always":
-        free_steps = course.steps
-    elif free == "while free":
-        still = np.all(inputs.numbers[:, every.acting] == 0.0, axis=1)
+    spans: list[int] = []
+    if free in ("always", "while free"):
+        still = (free == "always") | np.all(inputs.numbers[:, every.acting] == 0.0, axis=1)
         lengths = np.diff(np.append(inputs.rows, course.steps))
-        jumped = np.isin(inputs.rows, jumps)
-        free_steps = int(np.sum((lengths - jumped)[still]))
-    elif free == "between kicks":
-        span = course.size
-    doublings = max(0, ceil(log2(max(fastest * span / FIRST_ANGLE, 1.0))))
-    by_steps = found.sub_step + (found.doubling * doublings if free == "between kicks" else 0)
+        spans = free_spans(lengths, still, np.isin(inputs.rows, jumps), in_jumps=free == "always")
+    size = course.size if free != "never" else 0.0
+    doublings = max(0, ceil(log2(max(fastest * size / FIRST_ANGLE, 1.0))))
+    first = found.free.once + found.free.doubling * doublings
+    by_steps = found.sub_step + (found.free.doubling * doublings if free == "between kicks" else 0)
     total = (
-        by_steps * (sub_steps - free_steps)
-        + found.begun * (course.steps - free_steps)
-        + (found.free + found.doubling * doublings) * free_steps
+        by_steps * (sub_steps - sum(spans))
+        + found.begun * (course.steps - sum(spans))
+        + sum(first + (found.free.start + found.free.again * (n - 1) if n > 1 else 0) for n in spans)
         + found.changed * len(jumps)
     )
     return total / course.steps
+
+
+def free_spans(
+    lengths: Iterable[int], still: Iterable[bool], jumped: Iterable[bool], *, in_jumps: bool
+) -> list[int]:
+    """Returns how many steps in turn are free motion from one start, of each such start.
+
+    lengths  : steps for which inputs stay as they are, of each such piece
+    still    : whether nothing acts
+    jumped   : whether the composite changes where it begins
+    in_jumps : whether its first step is free then, too
+    """
+    spans = [0]
+    for length, free, jump in zip(lengths, still, jumped, strict=True):
+        if jump or not free:
+            spans.append(0)
+        if free:
+            spans[-1] += int(length) - int(jump and not in_jumps)
+    return [span for span in spans if span > 0]

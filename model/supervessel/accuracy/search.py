@@ -189,7 +189,7 @@ class Search:
         if acts and not moves and model.law != "none":
             names.append("split")
         for name in names:
-            at_least = float(free_operations()[0])
+            at_least = float(free_operations().again)
             if at_least >= self.limit:
                 self._leave(Choice(model, name), at_least)
             elif name == "exact":

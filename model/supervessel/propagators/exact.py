@@ -3,7 +3,7 @@
 import casadi as ca
 
 from supervessel.attitude import product, unit
-from supervessel.propagators import free_motion
+from supervessel.propagators import free_motion, theta
 from supervessel.propagators.method import Propagator
 
 STATE_SIZE = 7
@@ -49,6 +49,22 @@ def free_functions(size: int, where: slice) -> list[ca.Function]:
     ]
 
 
+def free_functions_of_start(size: int, where: slice) -> list[ca.Function]:
+    """Returns free motion to many times from one start, in two functions; arguments as of `free_functions`.
+
+    free_constants : x, a, scale -> k, not all finite where `theta` does not serve; x holds rates over scale
+    free_at        : k, t -> x at t
+    """
+    x, a, scale, t = (ca.SX.sym(*s) for s in (("x", STATE_SIZE), ("a", size), ("scale", 1), ("t", 1)))
+    k = ca.SX.sym("k", theta.CONSTANTS)
+    moments, to_body = a[where][:3], ca.reshape(a[where][3:], 3, 3)
+    found = theta.constants(x, moments, to_body, scale)
+    return [
+        ca.Function("free_constants", [x, a, scale], [found], ["x", "a", "scale"], ["k"]),
+        ca.Function("free_at", [k, t], [theta.at(k, t)], ["k", "t"], ["x"]),
+    ]
+
+
 def free_step(state: ca.SX, moments: ca.SX, to_body: ca.SX, time: ca.SX, doublings: int) -> ca.SX:
     """Returns the state (attitude, angular velocity), (7,), after free motion.
 
@@ -74,5 +90,6 @@ PROPAGATOR = Propagator(
     "error",
     "always",
     "Free motion in one step of any length, from the last instant at which torque or inertia changed in "
-    "value, by addition theorems of Jacobi's elliptic functions ([VS], [F]). Knows no torque.",
+    "value, by addition theorems of Jacobi's elliptic functions, or by theta functions where a second step "
+    "goes on from there ([VS], [F]). Knows no torque.",
 )

@@ -85,8 +85,8 @@ def phase(moments: ca.SX, omega: ca.SX, time: ca.SX) -> ca.SX:
     J0, J1, J2 = ca.vertsplit(moments)
     w0, _, w2 = ca.vertsplit(moving)
     exchanged = J2 * (J2 - J1) * (w2 * w2) < J0 * (J1 - J0) * (w0 * w0)
-    J, w, _ = _named(moments, moving, exchanged)
-    _, H = _invariants(J, w)
+    J, w, _ = named(moments, moving, exchanged)
+    _, H = invariants(J, w)
     return ca.fabs(span) * ca.sqrt(H * (J[2] - J[1]) / (J[0] * J[1] * J[2]))
 
 
@@ -96,11 +96,11 @@ def start(moments: ca.SX, omega: ca.SX, time: ca.SX, share: ca.SX) -> ca.SX:
     share : 2^-n, with n as `phase` demands
     """
     _, moving, span = _guarded(omega, time)
-    E = _separation(moments, moving)
+    E = separation(moments, moving)
     exchanged = E < 0.0
-    J, w, _ = _named(moments, moving, exchanged)
+    J, w, _ = named(moments, moving, exchanged)
     (J0, J1, J2), (w0, w1, w2) = J, w
-    G, H = _invariants(J, w)
+    G, H = invariants(J, w)
     width, lower = J2 - J0, J1 - J0
     per_product = 1.0 / (J0 * J1 * J2)
     A, B = H * (J2 - J1) * per_product, G * lower * per_product
@@ -141,7 +141,7 @@ def double(s: ca.SX) -> ca.SX:
     D2 = D2 + 0.5 * D2 * (1.0 - B * SS2 - D2 * D2)
     re, im = 1.0 + N * (SS2 - SS * (C2 * D2)), -c * SS * S2
     y, y2 = r * S, r * S2
-    re, im = _product((re, im), _product((CC - y * y, 2.0 * C * y), (C2, -y2)))
+    re, im = complex_product((re, im), complex_product((CC - y * y, 2.0 * C * y), (C2, -y2)))
     return ca.vertcat(S2, C2, D2, 2.0 * chi + ca.atan2(im, re), s[VARYING:])
 
 
@@ -155,9 +155,9 @@ def finish(moments: ca.SX, omega: ca.SX, time: ca.SX, s: ca.SX) -> tuple[ca.SX, 
     rest, moving, span = _guarded(omega, time)
     S, C, D, chi, A, _, _, _, _, r, length, rate, sign = ca.vertsplit(s)
     exchanged = sign < 0.0
-    J, w, flip = _named(moments, moving, exchanged)
+    J, w, flip = named(moments, moving, exchanged)
     (J0, J1, J2), (w0, w1, w2) = J, w
-    G, H = _invariants(J, w)
+    G, H = invariants(J, w)
     width, lower, upper = J2 - J0, J1 - J0, J2 - J1
     per_product = 1.0 / (J0 * J1 * J2)
     per_J0, per_J1, per_J2 = J1 * J2 * per_product, J0 * J2 * per_product, J0 * J1 * per_product
@@ -175,7 +175,7 @@ def finish(moments: ca.SX, omega: ca.SX, time: ca.SX, s: ca.SX) -> tuple[ca.SX, 
     Sw = S * w1
     re = sign * (G + f * J2 * (v1 * v1 - Sw * (width * per_J1 * (v0 * v2))))
     im = -sign * (length * f * (width * per_J0) * (Sw * v1))
-    re, im = _product(_product((re, im), (C, r * S)), (x0 * x1 + y0 * y1, y0 * x1 - x0 * y1))
+    re, im = complex_product(complex_product((re, im), (C, r * S)), (x0 * x1 + y0 * y1, y0 * x1 - x0 * y1))
     small = _square(G * (lower * G)) <= NEGLIGIBLE**2 * _square(J2 * length * (upper * H)) * A
     close = ca.logic_or(x0 * x0 + y0 * y0 <= CLOSE * (length * length), width == 0.0)
     omitted = ca.logic_and(small, close)
@@ -232,7 +232,7 @@ def _guarded(omega: ca.SX, time: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     return rest, ca.vertcat(omega[:2], ca.if_else(rest, 1.0, omega[2])), ca.if_else(rest, 0.0, time)
 
 
-def _named(moments: ca.SX, omega: ca.SX, exchanged: ca.SX) -> tuple[Triple, Triple, ca.SX]:
+def named(moments: ca.SX, omega: ca.SX, exchanged: ca.SX) -> tuple[Triple, Triple, ca.SX]:
     """Returns moments and rates by the names of the axes used here, and -1 where the body is turned by pi."""
     J0, J1, J2 = ca.vertsplit(moments)
     w0, w1, w2 = ca.vertsplit(omega)
@@ -243,13 +243,13 @@ def _named(moments: ca.SX, omega: ca.SX, exchanged: ca.SX) -> tuple[Triple, Trip
     return J, (first, second, flip * third), flip
 
 
-def _invariants(J: Triple, w: Triple) -> Pair:
+def invariants(J: Triple, w: Triple) -> Pair:
     """Returns G and H."""
     a, b, c = (J[i] * (w[i] * w[i]) for i in range(3))
     return (J[2] - J[0]) * a + (J[2] - J[1]) * b, (J[1] - J[0]) * b + (J[2] - J[0]) * c
 
 
-def _separation(moments: ca.SX, omega: ca.SX) -> ca.SX:
+def separation(moments: ca.SX, omega: ca.SX) -> ca.SX:
     """Returns E = J2 (J2 - J1) w2^2 - J0 (J1 - J0) w0^2, good to rounding where the two terms cancel.
 
     Near the separatrix the period goes with log E. Each term is made as an unevaluated sum of two doubles,
@@ -320,6 +320,6 @@ def _square(x: ca.SX) -> ca.SX:
     return x * x
 
 
-def _product(a: Pair, b: Pair) -> Pair:
+def complex_product(a: Pair, b: Pair) -> Pair:
     """Returns the product of two complex numbers."""
     return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
