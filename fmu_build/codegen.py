@@ -73,7 +73,7 @@ def scene_header(
     p_count, k_count, u_count = len(model.p_names), len(model.k_names), len(model.u_names)
     sizes = [(f.sz_arg(), f.sz_res(), f.sz_iw(), f.sz_w()) for f in functions]
     arg, res, iw, w = (max(1, *column) for column in zip(*sizes, strict=True))
-    begun = [f for f in model.functions if f.name() == "free_start"]
+    begun = [f for f in model.propagation if f.name() == "free_start"]
     constants = {
         "VARIABLE_COUNT": len(entries),
         "INPUT_P_COUNT": p_count,
@@ -145,10 +145,13 @@ def scene_source(entries: Sequence[Entry], token: str, changing: bool) -> str:
     needs = {entry.reference: _needs(entry, changing) for entry in entries}
     typed = any(entry.variable.boolean for entry in entries)
     rows = "\n".join(f"    {_row(entry, needs, typed)}," for entry in entries)
+    checks = [(entry.reference, check) for entry in entries if (check := _check(entry)) != "CHECK_NONE"]
+    judged = "\n".join(f"    {{{reference}, {check}}}," for reference, check in [*checks, (0, "CHECK_NONE")])
     return (
         "/* Generated: the scene's variables, by value reference. */\n"
         '#include "changes.h"\n\n'
         f"const Variable VARIABLES[VARIABLE_COUNT] = {{\n{rows}\n}};\n\n"
+        f"const Judged JUDGED[] = {{\n{judged}\n}};\n\n"
         f'const char MODEL_TOKEN[] = "{token}";\n'
     )
 
@@ -183,7 +186,6 @@ def _row(entry: Entry, needs: Mapping[int, frozenset[str]], typed: bool) -> str:
         repr(variable.start or 0.0),
         repr(variable.nominal),
         f"ROLE_{entry.role.upper()}",
-        _check(entry),
         " | ".join(f"FOLLOWS_{flag}" for flag in flags) or "0",
     ]
     if typed:

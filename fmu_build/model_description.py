@@ -7,6 +7,7 @@ from math import degrees
 from xml.etree import ElementTree as ET
 
 from fmu_build.table import Dependency, Entry, Role
+from fmu_build.xml_text import xml_text
 from supervessel.scene import Scene
 
 
@@ -82,9 +83,7 @@ def model_description(
     sources : names of the C files in sources/, which FMI 2.0 lists here
     """
     root = _fmi3(scene, entries, token) if fmi == 3 else _fmi2(scene, entries, token, sources)
-    ET.indent(root, "  ")
-    text: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
-    return text + b"\n"
+    return xml_text(root)
 
 
 def _header(scene: Scene, fmi_version: str, token_attribute: str, token: str) -> ET.Element:
@@ -199,8 +198,8 @@ def _unknown3(structure: ET.Element, name: str, entry: Entry, dependencies: Sequ
 
 def _dependencies(dependencies: Sequence[Dependency], offset: int = 0) -> dict[str, str]:
     return {
-        "dependencies": " ".join(str(d.reference + offset) for d in dependencies),
-        "dependenciesKind": " ".join(d.kind for d in dependencies),
+        "dependencies": " ".join([str(d.reference + offset) for d in dependencies]),
+        "dependenciesKind": " ".join([d.kind for d in dependencies]),
     }
 
 

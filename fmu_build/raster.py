@@ -16,6 +16,9 @@ Array = NDArray[np.float64]
 SMALLEST_AREA = 1e-3
 """Area [px2] below which a polygon has no inside to be filled."""
 
+MOST_AT_ONCE = 30_000
+"""Pixels times segments of a line that is drawn at once."""
+
 SHADES = 16.0
 """Steps of an edge pixel's cover: enough for the eye, and the file is smaller."""
 
@@ -213,34 +216,43 @@ def _stroke(
     margin = width / 2.0 + 1.0
     rows, columns = _window(canvas, [point for line in lines for point in line], margin)
     cover = np.zeros((rows.stop - rows.start, columns.stop - columns.start))
-    for line in lines:
-        for start, end in pairwise(line):
-            near = _window(canvas, (start, end), margin)
-            part = cover[
-                near[0].start - rows.start : near[0].stop - rows.start,
-                near[1].start - columns.start : near[1].stop - columns.start,
-            ]
-            distance = _distance(*_centres(*near), start, end, dash)
-            np.maximum(part, np.clip(width / 2.0 + 0.5 - distance, 0.0, min(width, 1.0)), out=part)
+    for line in (piece for whole in lines for piece in _pieces(canvas, whole, margin)):
+        near = _window(canvas, line, margin)
+        part = cover[
+            near[0].start - rows.start : near[0].stop - rows.start,
+            near[1].start - columns.start : near[1].stop - columns.start,
+        ]
+        distance = _distance(*_centres(*near), line, dash)
+        np.maximum(part, np.clip(width / 2.0 + 0.5 - distance, 0.0, min(width, 1.0)), out=part)
     _paint(canvas[rows, columns], cover, colour, 1.0)
 
 
-def _distance(x: Array, y: Array, start: Point, end: Point, dash: float) -> Array:
-    """Returns the distance, (n, m), of points from a segment, which may have no length.
+def _pieces(canvas: Array, line: Sequence[Point], margin: float) -> Sequence[Sequence[Point]]:
+    """Returns a line that is small as it is, a large one as its segments: what is drawn at once."""
+    rows, columns = _window(canvas, line, margin)
+    small = (rows.stop - rows.start) * (columns.stop - columns.start) * len(line) <= MOST_AT_ONCE
+    return [line] if small and len(line) > 1 else list(pairwise(line))
 
-    dash : length of dashes and gaps, 0 for none; the distance is that from the nearest dash
+
+def _distance(x: Array, y: Array, line: Sequence[Point], dash: float) -> Array:
+    """Returns the distance, (n, m), of points from a line, whose segments may have no length.
+
+    dash : length of dashes and gaps of each segment, 0 for none; the distance is that from the nearest dash
     """
-    x, y = x - start[0], y - start[1]
-    across, down = end[0] - start[0], end[1] - start[1]
-    length = hypot(across, down)
-    if length > 0.0:
-        across, down = across / length, down / length
+    segments = []
+    for (x0, y0), (x1, y1) in pairwise(line):
+        across, down = x1 - x0, y1 - y0
+        length = hypot(across, down)
+        unit = (across / length, down / length) if length > 0.0 else (across, down)
+        segments.append((x0, y0, *unit, length))
+    x0, y0, across, down, length = np.array(segments).T[..., None, None]
+    x, y = x - x0, y - y0
     along = np.clip(x * across + y * down, 0.0, length)
     if dash > 0.0:
         since = along % (2.0 * dash)
         nearest_end = np.where(since < 1.5 * dash, dash - since, 2.0 * dash - since)
         along = along + np.where(since > dash, nearest_end, 0.0)
-    distance: Array = np.hypot(x - along * across, y - along * down)
+    distance: Array = np.hypot(x - along * across, y - along * down).min(axis=0)
     return distance
 
 

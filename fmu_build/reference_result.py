@@ -13,9 +13,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
+from fmu_build.xml_text import xml_text
 from supervessel.equations import Equations, composite_slices, p_start
 from supervessel.scene import Scene
-from supervessel.variables import InputVariable, input_variables, output_variables
+from supervessel.variables import InputVariable, input_variables, output_names
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
@@ -51,7 +52,7 @@ def reference_result(scene: Scene, model: Equations) -> dict[str, bytes]:
     else:
         return {}
     ends = np.column_stack([times[[0, -1]], np.vstack([first, last])])
-    outputs = [variable.name for variable in output_variables(scene)]
+    outputs = output_names(scene)
     booleans = frozenset(variable.name for variable in inputs if variable.boolean)
     return {
         f"{FOLDER}/fmi-ls-manifest.xml": _manifest(),
@@ -149,7 +150,7 @@ def _manifest() -> bytes:
         ("text/csv", "outputs.csv", "result", "outputs at each communication point"),
     ):
         ET.SubElement(root, "Related", type=kind, source=source, role=role, description=description)
-    return _text(root)
+    return xml_text(root)
 
 
 def _experiments(step: float, duration: float) -> bytes:
@@ -165,10 +166,4 @@ def _experiments(step: float, duration: float) -> bytes:
     )
     ET.SubElement(experiment, "Stimuli", source="inputs.csv")
     ET.SubElement(experiment, "References", source="outputs.csv")
-    return _text(root)
-
-
-def _text(root: ET.Element) -> bytes:
-    ET.indent(root, "  ")
-    text: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
-    return text + b"\n"
+    return xml_text(root)

@@ -5,6 +5,7 @@ The modelDescription.xml and the C layer are both written from it.
 
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import casadi as ca
@@ -158,12 +159,15 @@ def _rows_by_structure(
 
     For composites so long that their Jacobian would take more than all the rest of a build.
     """
-    sparsity = ca.jacobian_sparsity(unknown, known)
-    rows: list[list[Dependency]] = [[] for _ in range(sparsity.size1())]
-    dependent = {reference: Dependency(reference, "dependent") for reference in knowns}
-    for row, column in zip(*sparsity.get_triplet(), strict=True):
-        rows[row].append(dependent[knowns[column]])
-    return [tuple(sorted(row, key=lambda d: d.reference)) for row in rows]
+    sparsity = ca.jacobian_sparsity(unknown, known).T  # of a sparsity all of a column stands together
+    dependent = [Dependency(reference, "dependent") for reference in knowns]
+    order = sorted(range(len(knowns)), key=knowns.__getitem__)
+    columns, ends = sparsity.row(), sparsity.colind()
+    rows = []
+    for begin, end in pairwise(ends):
+        held = set(columns[begin:end])
+        rows.append(tuple(dependent[column] for column in order if column in held))
+    return rows
 
 
 def _at_start(now: Iterable[Dependency], first_state: int, first_parameter: int) -> tuple[Dependency, ...]:
@@ -175,13 +179,14 @@ def _at_start(now: Iterable[Dependency], first_state: int, first_parameter: int)
         range(first_parameter, first_parameter + 3),
         range(first_parameter + 3, first_parameter + 7),
     )
-    found: dict[int, Kind] = {}
+    parameters: dict[int, Dependency] = {}
+    others = []
     for dependency in now:
         state = dependency.reference - first_state
         if not 0 <= state < 7:
-            found[dependency.reference] = dependency.kind
+            others.append(dependency)
         elif state < 4:
-            found |= dict.fromkeys(attitude, "dependent")
+            parameters |= {reference: Dependency(reference, "dependent") for reference in attitude}
         else:
-            found[rates[state - 4]] = dependency.kind
-    return tuple(Dependency(reference, found[reference]) for reference in sorted(found))
+            parameters[rates[state - 4]] = Dependency(rates[state - 4], dependency.kind)
+    return tuple(sorted([*others, *parameters.values()], key=lambda dependency: dependency.reference))

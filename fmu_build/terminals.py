@@ -11,6 +11,7 @@ from xml.etree import ElementTree as ET
 from fmu_build.figure import Figure, Item, Path, arrow, regular_polygon, svg
 from fmu_build.raster import png
 from fmu_build.table import Entry
+from fmu_build.xml_text import xml_text
 from supervessel.scene import Scene
 
 FILE_VERSION = {2: "3.0", 3: "3.0"}
@@ -113,9 +114,7 @@ def terminals_and_icons(scene: Scene, entries: Sequence[Entry], fmi: int) -> byt
         ):
             for place, terminal in enumerate(members):
                 _write(parent, terminal, side, place, len(members))
-    ET.indent(root, "  ")
-    text: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
-    return text + b"\n"
+    return xml_text(root)
 
 
 def terminal_icons(scene: Scene, entries: Sequence[Entry]) -> dict[str, bytes]:

@@ -21,12 +21,17 @@ static void copy_p(double to[], const double from[]) {
 
 /* Takes inputs of some kinds over from p; docks that close only if asked to. Returns whether any was another. */
 static bool take_over(double stage[], const double p[], unsigned kinds, bool closing) {
+    enum { AT_ONCE = 64 };
     bool changed = false;
-    for (size_t i = 0; i < INPUT_P_COUNT; i++) {
-        if (!(INPUT_KINDS[i] & kinds) || stage[i] == p[i]) continue;
-        if (INPUT_KINDS[i] == KIND_DOCKED && !closing && p[i] != 0.0) continue;
-        stage[i] = p[i];
-        changed = true;
+    for (size_t begin = 0; begin < INPUT_P_COUNT; begin += AT_ONCE) {
+        const size_t end = begin + AT_ONCE < INPUT_P_COUNT ? begin + AT_ONCE : INPUT_P_COUNT;
+        if (memcmp(&stage[begin], &p[begin], (end - begin) * sizeof *p) == 0) continue;
+        for (size_t i = begin; i < end; i++) {
+            if (!(INPUT_KINDS[i] & kinds) || stage[i] == p[i]) continue;
+            if (INPUT_KINDS[i] == KIND_DOCKED && !closing && p[i] != 0.0) continue;
+            stage[i] = p[i];
+            changed = true;
+        }
     }
     return changed;
 }
@@ -60,11 +65,17 @@ static void first_stage(const Instance *instance, const double p[], Stage *stage
     move_stage(stage, p, KIND_DOCKED);
 }
 
-/* Goes on from a stage to one where inputs of some kinds are as in p, keeping the momentum. */
-static Status keep(Instance *instance, Stage *stage, const double p[], unsigned kinds, double rate[3]) {
+/* Goes on from a stage to one where inputs of some kinds are as in p, whose composite is c, keeping the momentum. */
+static Status keep(Instance *instance, Stage *stage, const double p[], const double c[], unsigned kinds,
+                   double rate[3]) {
+    if (memcmp(stage->p, p, sizeof stage->p) == 0) return STATUS_OK;
     Stage next = *stage;
     double changed[3];
     if (!move_stage(&next, p, kinds)) return STATUS_OK;
+    if (memcmp(next.p, p, sizeof next.p) == 0) {
+        memcpy(next.c, c, sizeof next.c);
+        next.c_is_current = true;
+    }
     Status status = weigh(instance, stage);
     if (status == STATUS_OK) status = weigh(instance, &next);
     if (status != STATUS_OK) return status;
@@ -79,17 +90,17 @@ static Status keep(Instance *instance, Stage *stage, const double p[], unsigned 
 }
 
 /* The angular velocity before docks close, after all else has changed to p. */
-static Status rate_kept(Instance *instance, const double p[], double rate[3]) {
+static Status rate_kept(Instance *instance, const double p[], const double c[], double rate[3]) {
     Stage stage;
     Status status = STATUS_OK;
     first_stage(instance, p, &stage);
 #if MASSES_KEEP_MOMENTUM
-    status = keep(instance, &stage, p, KIND_MASS, rate);
+    status = keep(instance, &stage, p, c, KIND_MASS, rate);
 #else
     move_stage(&stage, p, KIND_MASS);
 #endif
 #if POSES_KEEP_MOMENTUM
-    if (status == STATUS_OK) status = keep(instance, &stage, p, KIND_POSE, rate);
+    if (status == STATUS_OK) status = keep(instance, &stage, p, c, KIND_POSE, rate);
 #endif
     return status;
 }
@@ -143,7 +154,7 @@ static Status rate_after(Instance *instance, const double p[], const double c[],
     memcpy(rate, now->kept_rate, sizeof now->kept_rate);
     if (memcmp(p, now->stepped_p, INPUT_P_COUNT * sizeof(double)) == 0) return STATUS_OK;
 #if MASSES_KEEP_MOMENTUM || POSES_KEEP_MOMENTUM
-    status = rate_kept(instance, p, rate);
+    status = rate_kept(instance, p, c, rate);
 #endif
 #if DOCK_COUNT
     if (status == STATUS_OK) dock(instance, p, c, rate);
@@ -198,8 +209,12 @@ void changes_mirror(Instance *instance) {
 /* A dock that opened or closed has changed the momentum; everything else keeps it. */
 static bool docks_moved(const Instance *instance) {
     bool moved = false;
+#if DOCK_COUNT
     for (size_t i = 0; i < INPUT_P_COUNT; i++)
         moved = moved || (INPUT_KINDS[i] == KIND_DOCKED && instance->now.p[i] != instance->now.stepped_p[i]);
+#else
+    (void)instance;
+#endif
     return moved;
 }
 

@@ -68,6 +68,10 @@ static int scale_vector(double v[3]) {
     return -exponent;
 }
 
+static double square_of(const double v[3]) {
+    return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+}
+
 /* Judges direction and alignment, which stand one after the other; p holds them and gets them scaled. */
 static Status check_port(Instance *instance, const Variable *variable, const double *values, double *p) {
     double *d = p, *a = p + 3;
@@ -78,9 +82,9 @@ static Status check_port(Instance *instance, const Variable *variable, const dou
                                group_length(&variable[i]), variable[i].name);
     }
     const double across[3] = {d[1] * a[2] - d[2] * a[1], d[2] * a[0] - d[0] * a[2], d[0] * a[1] - d[1] * a[0]};
-    const double lengths = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) * sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
-    const double area = sqrt(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]);
-    if (area >= PARALLEL_LIMIT * lengths) return STATUS_OK;
+    const double square = square_of(across), squares[2] = {square_of(d), square_of(a)};
+    if (square > 2.0 * PARALLEL_LIMIT * PARALLEL_LIMIT * (squares[0] * squares[1])) return STATUS_OK; /* far from it */
+    if (sqrt(square) >= PARALLEL_LIMIT * (sqrt(squares[0]) * sqrt(squares[1]))) return STATUS_OK;
     return instance_refuse(instance,
                            "%.*s = (%.10g, %.10g, %.10g): must not be parallel to %.*s = (%.10g, %.10g, %.10g) within "
                            "%g rad",
@@ -88,18 +92,25 @@ static Status check_port(Instance *instance, const Variable *variable, const dou
                            group_length(variable), variable->name, values[0], values[1], values[2], PARALLEL_LIMIT);
 }
 
-/* Judges the inputs; p holds them and gets directions and alignments scaled. */
+/* Judges the inputs; p holds them and gets directions and alignments scaled. Of those that stand as they do in the
+   current composite, as judged then and scaled, moments and ports need not be judged again. */
 static Status check_inputs(Instance *instance, double p[]) {
+    const Dynamics *now = &instance->now;
+    const bool judged_before = now->c[COMPOSITE_MASS] > 0.0;
     Status status = STATUS_OK;
-    for (size_t i = REFERENCE_P; i < REFERENCE_CONTACT && status == STATUS_OK; i++) {
-        const Variable *variable = &VARIABLES[i];
-        const double *value = &instance->now.values[i];
-        switch (variable->check) {
-            case CHECK_MASS: status = check_mass(instance, variable, value); break;
-            case CHECK_PMI: status = check_pmi(instance, variable, value); break;
-            case CHECK_PORT: status = check_port(instance, variable, value, &p[i - REFERENCE_P]); break;
-            case CHECK_NONE: break;
-        }
+    for (const Judged *judged = JUDGED; judged->check != CHECK_NONE && status == STATUS_OK; judged++) {
+        static const size_t together[] = {[CHECK_PMI] = 3, [CHECK_PORT] = 6};
+        const size_t place = judged->reference - REFERENCE_P;
+        const Variable *variable = &VARIABLES[judged->reference];
+        const double *value = &now->values[judged->reference];
+        if (judged->check == CHECK_MASS)
+            status = check_mass(instance, variable, value);
+        else if (judged_before && memcmp(value, &now->p[place], together[judged->check] * sizeof *value) == 0)
+            continue;
+        else if (judged->check == CHECK_PMI)
+            status = check_pmi(instance, variable, value);
+        else
+            status = check_port(instance, variable, value, &p[place]);
     }
 #if DOCK_COUNT
     if (status == STATUS_OK) status = changes_check_docks(instance, p);
@@ -211,8 +222,9 @@ void composite_refresh_axes(Instance *instance) {
 }
 
 void composite_scale_variation(const Instance *instance, double p[]) {
-    for (size_t i = REFERENCE_P; i < REFERENCE_CONTACT; i++) {
-        if (VARIABLES[i].check != CHECK_PORT) continue;
+    for (const Judged *judged = JUDGED; judged->check != CHECK_NONE; judged++) {
+        const size_t i = judged->reference;
+        if (judged->check != CHECK_PORT) continue;
         for (size_t k = i; k < i + 6; k += 3) {
             double scaled[3];
             memcpy(scaled, &instance->now.values[k], sizeof scaled);

@@ -8,30 +8,48 @@
 
 #include "lane_kernels.h"
 
-enum { POSE = 12, PORT = 9, SEEN = 9, MOST_ARGUMENTS = 10 };
+enum { POSE = 12, PORT = 9, SEEN = 9, MOST_ARGUMENTS = 10, BLOCK = LOOP_BLOCK };
 
-/* Values, or small changes of or weights on them: everything between p and c. */
+/* What follows from p. Of poses and of bodies seen from the root as many stand side by side as in the tables; the
+   root's own pose is the last of the first ones. */
 typedef struct {
-    double pose[LOOP_FRAME_COUNT][POSE], seen[LOOP_BODY_COUNT][SEEN], mass[LOOP_BODY_COUNT];
+    double pose[(LOOP_FRAME_COUNT + 2 * BLOCK - 2) / BLOCK * BLOCK * POSE];
+    double seen[LOOP_BODY_COUNT * SEEN], mass[LOOP_BODY_COUNT], first[3];
     double sum[4], middle[3], inertia[6];
 } Chain;
+
+/* Small changes of it, or weights on it. */
+typedef struct {
+    double pose[LOOP_FRAME_COUNT][POSE], seen[LOOP_BODY_COUNT][SEEN];
+    double sum[4], middle[3], inertia[6];
+} ChainVariation;
+
+typedef char WorkHoldsBoth[sizeof(Chain) + sizeof(ChainVariation) <= LOOP_WORK * sizeof(double) ? 1 : -1];
 
 /* Sums are read and written in one place: each element of theirs follows from the same element before. */
 typedef int Kernel(const double **arg, double **res, int *iw, double *w, int mem);
 
-static Kernel *const SEE_FORWARD[] = {loop_fixed_forward, loop_scaled_forward, loop_free_forward, loop_diagonal_forward,
+static Kernel *const SEE_FORWARD[] = {loop_fixed_forward, loop_scaled_forward, loop_free_forward,
+        loop_diagonal_forward, loop_diagonal_forward,
         loop_own_fixed_forward, loop_own_scaled_forward, loop_own_free_forward};
-static Kernel *const SEE_REVERSE[] = {loop_fixed_reverse, loop_scaled_reverse, loop_free_reverse, loop_diagonal_reverse,
+static Kernel *const SEE_REVERSE[] = {loop_fixed_reverse, loop_scaled_reverse, loop_free_reverse,
+        loop_diagonal_reverse, loop_diagonal_reverse,
         loop_own_fixed_reverse, loop_own_scaled_reverse, loop_own_free_reverse};
+
+/* How many constants a body has: centre and inertia, a pose, or moments. */
+static const size_t HELD_COUNT[] = {SEEN, SEEN, POSE, 3, 0, SEEN, SEEN, POSE};
 
 static const double NOTHING[POSE];
 
-static const double *value(const double p[], int index) {
-    return index >= 0 ? &p[index] : &LOOP_HELD[~index];
+/* What places are in: p and LOOP_HELD. */
+typedef const double *const Sources[2];
+
+LANES_INLINE const double *value(const Sources from, LoopPlace place) {
+    return &from[place.held][place.at];
 }
 
-static const double *change(const double dp[], int index) {
-    return index >= 0 ? &dp[index] : NOTHING;
+static const double *change(const double dp[], LoopPlace place) {
+    return place.held ? NOTHING : &dp[place.at];
 }
 
 static void add_to(double sum[], const double terms[], size_t count) {
@@ -39,163 +57,209 @@ static void add_to(double sum[], const double terms[], size_t count) {
 }
 
 /* Adds weights on an input; what is constant has none. */
-static void add_weights(double wp[], int index, const double terms[], size_t count) {
-    if (index >= 0) add_to(&wp[index], terms, count);
+static void add_weights(double wp[], LoopPlace place, const double terms[], size_t count) {
+    if (!place.held) add_to(&wp[place.at], terms, count);
 }
 
-/* Places frames in axes that stand already, all in the same way.
-   step : poses in those of the vessels that they hang on
-   to   : where their poses go */
-static void hang(const double p[], const Chain *now, const LoopFrame *const f[LANES], const Lanes step[POSE],
-                 double *const to[LANES]) {
-    const double *outer[LANES], *inside[LANES];
-    Lanes pose[POSE], held[POSE], turned[POSE], placed[POSE];
+/* Where the pose of a frame stands, and which frame's it is. */
+static size_t pose_at(size_t frame) {
+    const size_t place = frame + BLOCK - 1;
+    return place / BLOCK * BLOCK * POSE + place % BLOCK;
+}
+static size_t frame_at(int pose) {
+    return (size_t)pose / (BLOCK * POSE) * BLOCK + (size_t)pose % BLOCK - (BLOCK - 1);
+}
+
+/* Where the numbers of a body begin that is seen from the root. */
+static size_t seen_at(size_t body) {
+    return body / BLOCK * BLOCK * SEEN + body % BLOCK;
+}
+
+/* Takes numbers of one among those that stand side by side. */
+static const double *take(double to[], const double from[], size_t count) {
+    for (size_t i = 0; i < count; i++) to[i] = from[i * BLOCK];
+    return to;
+}
+
+/* Poses of frames in axes that stand already: of the groups that they hang on; of INSIDE, all of them or none, by the
+   vessel there. */
+LANES_INLINE void place_groups(const Sources sources, const Chain *now, const LoopFrame *const f[LANES], bool inside,
+                               Lanes placed[POSE]) {
+    const double *outer[LANES], *parent_port[LANES], *child_port[LANES], *held[LANES];
+    Lanes parent[PORT], child[PORT], step[POSE], pose[POSE], within[POSE], turned[POSE];
     for (size_t k = 0; k < LANES; k++) {
-        outer[k] = now->pose[f[k]->parent];
-        inside[k] = value(p, f[k]->inside);
+        parent_port[k] = value(sources, f[k]->parent_port);
+        child_port[k] = value(sources, f[k]->child_port);
+        outer[k] = &now->pose[f[k]->parent];
+        held[k] = &LOOP_HELD[f[k]->inside];
     }
-    if (f[0]->kind == FRAME_INSIDE) {
-        lanes_gather(held, inside, POSE);
-        lanes_then((const Lanes *const[]){held, step}, turned);
-        step = turned;
+    lanes_gather(parent, parent_port, 1, PORT);
+    lanes_gather(child, child_port, 1, PORT);
+    lanes_mated((const Lanes *const[]){parent, child}, step);
+    if (inside) {
+        lanes_gather(within, held, 1, POSE);
+        lanes_then((const Lanes *const[]){within, step}, turned);
     }
-    lanes_gather(pose, outer, POSE);
-    lanes_then((const Lanes *const[]){pose, step}, placed);
-    lanes_scatter(to, placed, POSE);
+    lanes_gather(pose, outer, BLOCK, POSE);
+    lanes_then((const Lanes *const[]){pose, inside ? turned : step}, placed);
 }
 
-static void hang_one(const double p[], Chain *now, size_t frame, const Lanes steps[POSE], size_t lane) {
+/* Places a frame that hangs on one so near before it that it must wait for that. */
+static void place_one(const Sources sources, Chain *now, size_t frame) {
     const LoopFrame *f[LANES];
-    double *to[LANES];
-    Lanes step[POSE];
-    for (size_t k = 0; k < LANES; k++) {
-        f[k] = &LOOP_FRAMES[frame];
-        to[k] = now->pose[frame];
-    }
-    for (size_t i = 0; i < POSE; i++) step[i] = lanes_all(lane_of(steps[i], lane));
-    hang(p, now, f, step, to);
+    Lanes placed[POSE];
+    for (size_t k = 0; k < LANES; k++) f[k] = &LOOP_FRAMES[frame];
+    if (f[0]->kind == FRAME_INSIDE)
+        place_groups(sources, now, f, true, placed);
+    else
+        place_groups(sources, now, f, false, placed);
+    for (size_t i = 0; i < POSE; i++) now->pose[pose_at(frame) + i * BLOCK] = lane_of(placed[i], 0);
 }
 
-static void place_frames(const double p[], Chain *now) {
-    memset(now->pose[0], 0, sizeof now->pose[0]);
-    for (size_t i = 0; i < 9; i += 4) now->pose[0][i] = 1.0;
+static void place_frames(const Sources sources, Chain *now) {
+    for (size_t i = 0; i < POSE; i++) now->pose[pose_at(0) + i * BLOCK] = i < 9 && i % 4 == 0 ? 1.0 : 0.0;
     for (size_t i = 1; i < LOOP_FRAME_COUNT; i += LANES) {
-        const size_t count = i + LANES <= LOOP_FRAME_COUNT ? LANES : 1;
         const LoopFrame *f[LANES];
-        const double *parent_port[LANES], *child_port[LANES];
-        double *to[LANES];
-        Lanes parent[PORT], child[PORT], step[POSE];
-        bool together = true;
-        for (size_t k = 0; k < LANES; k++) {
-            const size_t frame = k < count ? i + k : i;
-            f[k] = &LOOP_FRAMES[frame];
-            to[k] = now->pose[frame];
-            parent_port[k] = value(p, f[k]->parent_port);
-            child_port[k] = value(p, f[k]->child_port);
-            together = together && (size_t)f[k]->parent < i && f[k]->kind == f[0]->kind;
+        Lanes placed[POSE];
+        bool together = i + LANES <= LOOP_FRAME_COUNT;
+        for (size_t k = 0; k < LANES && together; k++) {
+            f[k] = &LOOP_FRAMES[i + k];
+            together = (size_t)f[k]->parent < pose_at(i) && f[k]->kind == f[0]->kind;
         }
-        lanes_gather(parent, parent_port, PORT);
-        lanes_gather(child, child_port, PORT);
-        lanes_mated((const Lanes *const[]){parent, child}, step);
-        if (together) {
-            hang(p, now, f, step, to);
-        } else {
-            for (size_t k = 0; k < count; k++) hang_one(p, now, i + k, step, k);
+        if (!together) {
+            for (size_t k = i; k < i + LANES && k < LOOP_FRAME_COUNT; k++) place_one(sources, now, k);
+            continue;
         }
+        if (f[0]->kind == FRAME_INSIDE)
+            place_groups(sources, now, f, true, placed);
+        else
+            place_groups(sources, now, f, false, placed);
+        lanes_store(&now->pose[pose_at(i)], placed, POSE);
     }
 }
 
-static void take_poses(Lanes to[POSE], const Chain *now, const LoopBody *const b[LANES]) {
-    const double *from[LANES];
-    for (size_t k = 0; k < LANES; k++) from[k] = now->pose[b[k]->frame];
-    lanes_gather(to, from, POSE);
+LANES_INLINE void take_poses(Lanes to[POSE], const Chain *now, const LoopBody *const b[LANES]) {
+    const double *from[LANES], *side_by_side;
+    double gathered[POSE * BLOCK];
+    bool apart = b[0]->frame % LANES != 0;
+    for (size_t k = 0; k < LANES; k++) {
+        from[k] = &now->pose[b[k]->frame];
+        apart = apart || from[k] != from[0] + k;
+    }
+    side_by_side = from[0];
+    if (apart) {
+        lanes_gather(to, from, BLOCK, POSE);
+        lanes_store(gathered, to, POSE);
+        side_by_side = gathered;
+    }
+    lanes_load(to, side_by_side, POSE);
 }
 
-static void take_held(Lanes to[], const double p[], const LoopBody *const b[LANES], size_t count) {
-    const double *from[LANES];
-    for (size_t k = 0; k < LANES; k++) from[k] = value(p, b[k]->held);
-    lanes_gather(to, from, count);
+LANES_INLINE void take_held(Lanes to[], const LoopBody *const b[LANES], size_t count) {
+    lanes_load(to, &LOOP_HELD[b[0]->held], count);
 }
 
-static void take_moments(Lanes to[3], const double p[], const LoopBody *const b[LANES]) {
+LANES_INLINE void take_moments(Lanes to[3], const Sources sources, const LoopBody *const b[LANES]) {
     const double *from[LANES];
-    for (size_t k = 0; k < LANES; k++) from[k] = value(p, b[k]->moments);
-    lanes_gather(to, from, 3);
+    for (size_t k = 0; k < LANES; k++) from[k] = value(sources, b[k]->moments);
+    lanes_gather(to, from, 1, 3);
 }
 
 /* Sees bodies of one kind from the root's axes. */
-static void see(const double p[], const Chain *now, const LoopBody *const b[LANES], const Lanes *mass, Lanes seen[SEEN]) {
+LANES_INLINE void see(const Sources sources, const Chain *now, int kind, const LoopBody *const b[LANES], const Lanes *mass,
+                      Lanes seen[SEEN]) {
     Lanes pose[POSE], held[POSE], moments[3];
     const Lanes *const arg[] = {pose, mass, held, moments};
-    switch (b[0]->kind) {
+    switch (kind) {
         case BODY_FIXED:
             take_poses(pose, now, b);
-            take_held(held, p, b, SEEN);
+            take_held(held, b, SEEN);
             lanes_fixed(arg, seen);
             break;
         case BODY_SCALED:
             take_poses(pose, now, b);
-            take_held(held, p, b, SEEN);
+            take_held(held, b, SEEN);
             lanes_scaled(arg, seen);
             break;
         case BODY_FREE:
             take_poses(pose, now, b);
-            take_held(held, p, b, POSE);
-            take_moments(moments, p, b);
+            take_held(held, b, POSE);
+            take_moments(moments, sources, b);
             lanes_free(arg, seen);
             break;
         case BODY_DIAGONAL:
             take_poses(pose, now, b);
-            take_moments(moments, p, b);
+            take_held(moments, b, 3);
+            lanes_diagonal(arg, seen);
+            break;
+        case BODY_DIAGONAL_FREE:
+            take_poses(pose, now, b);
+            take_moments(moments, sources, b);
             lanes_diagonal(arg, seen);
             break;
         case BODY_OWN_FIXED:
-            take_held(held, p, b, SEEN);
+            take_held(held, b, SEEN);
             lanes_own_fixed(arg, seen);
             break;
         case BODY_OWN_SCALED:
-            take_held(held, p, b, SEEN);
+            take_held(held, b, SEEN);
             lanes_own_scaled(arg, seen);
             break;
         case BODY_OWN_FREE:
         default:
-            take_held(held, p, b, POSE);
-            take_moments(moments, p, b);
+            take_held(held, b, POSE);
+            take_moments(moments, sources, b);
             lanes_own_free(arg, seen);
             break;
     }
 }
 
 /* Takes as many bodies as there are lanes: the tables have as many of a kind together. */
-static void take_bodies(const LoopBody *b[LANES], size_t first) {
+LANES_INLINE void take_bodies(const LoopBody *b[LANES], size_t first) {
     for (size_t k = 0; k < LANES; k++) b[k] = &LOOP_BODIES[first + k];
 }
 
-static Lanes masses_of(const double p[], const LoopBody *const b[LANES]) {
+LANES_INLINE Lanes masses_of(const Sources sources, const LoopBody *const b[LANES]) {
     double mass[LANES];
-    for (size_t k = 0; k < LANES; k++) mass[k] = *value(p, b[k]->mass);
+    for (size_t k = 0; k < LANES; k++) mass[k] = *value(sources, b[k]->mass);
     return lanes_of(mass);
 }
 
-/* Sums masses and first moments about the first body's centre. */
-static void sum_masses(const double p[], Chain *now) {
-    double sum[4] = {0.0, 0.0, 0.0, 0.0};
-    Lanes first[3];
-    for (size_t j = 0; j < LOOP_BODY_COUNT; j += LANES) {
+/* Sums masses and first moments of a run of bodies of one kind. Returns where it ends.
+   first : the first body's centre in every lane, which that body itself sets */
+LANES_INLINE size_t sum_run(const Sources sources, Chain *now, int kind, size_t j, Lanes first[3], double sum[4]) {
+    for (; j < LOOP_BODY_COUNT && LOOP_BODIES[j].kind == kind; j += LANES) {
         const LoopBody *b[LANES];
         take_bodies(b, j);
-        const Lanes mass = masses_of(p, b);
+        const Lanes mass = masses_of(sources, b);
         Lanes seen[SEEN], lever[3];
-        double *to[LANES];
-        see(p, now, b, &mass, seen);
-        for (size_t k = 0; k < LANES; k++) to[k] = now->seen[j + k];
-        lanes_scatter(to, seen, SEEN);
+        see(sources, now, kind, b, &mass, seen);
+        lanes_store(&now->seen[seen_at(j)], seen, SEEN);
         memcpy(&now->mass[j], &mass, sizeof mass);
-        for (size_t i = 0; i < 3 && j == 0; i++) first[i] = lanes_all(lane_of(seen[i], 0));
+        for (size_t i = 0; i < 3 && j == 0; i++) first[i] = lanes_all(now->first[i] = lane_of(seen[i], 0));
         lanes_lever((const Lanes *const[]){&mass, seen, first}, lever);
         for (size_t k = 0; k < LANES; k++) {
             sum[0] += lane_of(mass, k);
             for (size_t i = 0; i < 3; i++) sum[i + 1] += lane_of(lever[i], k);
+        }
+    }
+    return j;
+}
+
+/* Sums masses and first moments about the first body's centre. */
+static void sum_masses(const Sources sources, Chain *now) {
+    double sum[4] = {0.0, 0.0, 0.0, 0.0};
+    Lanes first[3];
+    for (size_t j = 0; j < LOOP_BODY_COUNT;) {
+        switch (LOOP_BODIES[j].kind) {
+            case BODY_FIXED: j = sum_run(sources, now, BODY_FIXED, j, first, sum); break;
+            case BODY_SCALED: j = sum_run(sources, now, BODY_SCALED, j, first, sum); break;
+            case BODY_FREE: j = sum_run(sources, now, BODY_FREE, j, first, sum); break;
+            case BODY_DIAGONAL: j = sum_run(sources, now, BODY_DIAGONAL, j, first, sum); break;
+            case BODY_DIAGONAL_FREE: j = sum_run(sources, now, BODY_DIAGONAL_FREE, j, first, sum); break;
+            case BODY_OWN_FIXED: j = sum_run(sources, now, BODY_OWN_FIXED, j, first, sum); break;
+            case BODY_OWN_SCALED: j = sum_run(sources, now, BODY_OWN_SCALED, j, first, sum); break;
+            case BODY_OWN_FREE: j = sum_run(sources, now, BODY_OWN_FREE, j, first, sum); break;
         }
     }
     memcpy(now->sum, sum, sizeof sum);
@@ -206,53 +270,71 @@ static void sum_inertia(Chain *now) {
     double inertia[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
     Lanes first[3], middle[3];
     for (size_t i = 0; i < 3; i++) {
-        first[i] = lanes_all(now->seen[0][i]);
+        first[i] = lanes_all(now->first[i]);
         middle[i] = lanes_all(now->middle[i]);
     }
     for (size_t j = 0; j < LOOP_BODY_COUNT; j += LANES) {
         const Lanes mass = lanes_of(&now->mass[j]);
-        const double *seen[LANES];
-        Lanes centre[3], own[6];
-        for (size_t k = 0; k < LANES; k++) seen[k] = now->seen[j + k];
-        lanes_gather(centre, seen, 3);
-        lanes_spread((const Lanes *const[]){&mass, centre, first, middle}, own);
+        Lanes seen[SEEN], own[6];
+        lanes_load(seen, &now->seen[seen_at(j)], SEEN);
+        lanes_spread((const Lanes *const[]){&mass, seen, first, middle}, own);
         for (size_t k = 0; k < LANES; k++)
-            for (size_t i = 0; i < 6; i++) inertia[i] = inertia[i] + seen[k][i + 3] + lane_of(own[i], k);
+            for (size_t i = 0; i < 6; i++) inertia[i] += lane_of(own[i], k);
     }
     memcpy(now->inertia, inertia, sizeof inertia);
 }
 
 static void put_together(const double p[], Chain *now, double *w) {
-    place_frames(p, now);
-    sum_masses(p, now);
+    const Sources sources = {p, LOOP_HELD};
+    place_frames(sources, now);
+    sum_masses(sources, now);
     const double *sum[] = {now->sum};
     double *middle[] = {now->middle};
     loop_middle(sum, middle, NULL, w, 0);
     sum_inertia(now);
 }
 
-/* w: two chains, then what the kernels need. */
+/* w: a chain, its variation, then what the kernels need. */
 int composite(const double **arg, double **res, int *iw, double *w, int mem) {
     Chain *now = (Chain *)w;
     put_together(arg[0], now, w + LOOP_WORK);
-    const double *whole[] = {now->sum, now->seen[0], now->middle, now->inertia};
+    const double *whole[] = {now->sum, now->first, now->middle, now->inertia};
     return loop_finish(whole, res, iw, w + LOOP_WORK, mem);
+}
+
+/* A body and a frame as single ones, for derivatives. */
+typedef struct {
+    double pose[POSE], held[POSE], seen[SEEN];
+    const double *mass, *moments;
+} One;
+
+static const LoopBody *take_body(One *one, const Sources sources, const Chain *now, size_t body) {
+    const LoopBody *b = &LOOP_BODIES[body];
+    take(one->pose, &now->pose[b->frame], POSE);
+    take(one->held, &LOOP_HELD[b->held], HELD_COUNT[b->kind]);
+    take(one->seen, &now->seen[seen_at(body)], SEEN);
+    one->mass = value(sources, b->mass);
+    one->moments = b->kind == BODY_DIAGONAL ? one->held : value(sources, b->moments);
+    return b;
 }
 
 int composite_forward(const double **arg, double **res, int *iw, double *w, int mem) {
     const double *p = arg[0], *dp = arg[1];
-    Chain *now = (Chain *)w, *d = now + 1;
+    Chain *now = (Chain *)w;
+    ChainVariation *d = (ChainVariation *)(now + 1);
+    const Sources sources = {p, LOOP_HELD};
+    One one;
     w += LOOP_WORK;
     put_together(p, now, w);
     memset(d, 0, sizeof *d);
     for (size_t i = 1; i < LOOP_FRAME_COUNT; i++) {
         const LoopFrame *f = &LOOP_FRAMES[i];
         double *to[] = {d->pose[i]};
-        const double *pose = now->pose[f->parent], *dpose = d->pose[f->parent];
-        const double *parent = value(p, f->parent_port), *child = value(p, f->child_port);
+        const double *pose = take(one.pose, &now->pose[f->parent], POSE), *dpose = d->pose[frame_at(f->parent)];
+        const double *parent = value(sources, f->parent_port), *child = value(sources, f->child_port);
         const double *dparent = change(dp, f->parent_port), *dchild = change(dp, f->child_port);
         if (f->kind == FRAME_INSIDE) {
-            const double *from[] = {pose, value(p, f->inside), parent, child, dpose, NOTHING, dparent, dchild};
+            const double *from[] = {pose, &LOOP_HELD[f->inside], parent, child, dpose, NOTHING, dparent, dchild};
             loop_hang_inside_forward(from, to, iw, w, mem);
         } else {
             const double *from[] = {pose, parent, child, dpose, dparent, dchild};
@@ -260,13 +342,13 @@ int composite_forward(const double **arg, double **res, int *iw, double *w, int 
         }
     }
     for (size_t j = 0; j < LOOP_BODY_COUNT; j++) {
-        const LoopBody *b = &LOOP_BODIES[j];
-        const double *mass = value(p, b->mass), *dmass = change(dp, b->mass);
-        const double *from[] = {now->pose[b->frame], mass, value(p, b->held), value(p, b->moments),
-                                d->pose[b->frame], dmass, NOTHING, change(dp, b->moments)};
+        const LoopBody *b = take_body(&one, sources, now, j);
+        const double *dmass = change(dp, b->mass);
+        const double *from[] = {one.pose, one.mass, one.held, one.moments,
+                                d->pose[frame_at(b->frame)], dmass, NOTHING, change(dp, b->moments)};
         double *to[] = {d->seen[j]};
         SEE_FORWARD[b->kind](from, to, iw, w, mem);
-        const double *weighed[] = {now->sum, mass, now->seen[j], now->seen[0], d->sum, dmass, d->seen[j], d->seen[0]};
+        const double *weighed[] = {now->sum, one.mass, one.seen, now->first, d->sum, dmass, d->seen[j], d->seen[0]};
         to[0] = d->sum;
         loop_weigh_forward(weighed, to, iw, w, mem);
     }
@@ -274,47 +356,48 @@ int composite_forward(const double **arg, double **res, int *iw, double *w, int 
     double *middle_of[] = {d->middle};
     loop_middle_forward(sum, middle_of, iw, w, mem);
     for (size_t j = 0; j < LOOP_BODY_COUNT; j++) {
-        const int mass = LOOP_BODIES[j].mass;
-        const double *from[] = {now->inertia, value(p, mass), now->seen[j], now->seen[0], now->middle,
-                                d->inertia, change(dp, mass), d->seen[j], d->seen[0], d->middle};
+        const LoopBody *b = take_body(&one, sources, now, j);
+        const double *from[] = {now->inertia, one.mass, one.seen, now->first, now->middle,
+                                d->inertia, change(dp, b->mass), d->seen[j], d->seen[0], d->middle};
         double *to[] = {d->inertia};
         loop_add_forward(from, to, iw, w, mem);
     }
-    const double *whole[] = {now->sum, now->seen[0], now->middle, now->inertia,
+    const double *whole[] = {now->sum, now->first, now->middle, now->inertia,
                              d->sum, d->seen[0], d->middle, d->inertia};
     return loop_finish_forward(whole, res, iw, w, mem);
 }
 
 /* Weights on bodies to those on their frames and on p. */
-static void bodies_reverse(const double p[], const Chain *now, Chain *v, double wp[], double *w) {
+static void bodies_reverse(const Sources sources, const Chain *now, ChainVariation *v, double wp[], double *w) {
     for (size_t j = 0; j < LOOP_BODY_COUNT; j++) {
-        const LoopBody *b = &LOOP_BODIES[j];
+        One one;
+        const LoopBody *b = take_body(&one, sources, now, j);
         double pose[POSE], mass[1], held[POSE], moments[3];
-        const double *from[] = {now->pose[b->frame], value(p, b->mass), value(p, b->held), value(p, b->moments),
-                                v->seen[j]};
+        const double *from[] = {one.pose, one.mass, one.held, one.moments, v->seen[j]};
         double *to[] = {pose, mass, held, moments};
         SEE_REVERSE[b->kind](from, to, NULL, w, 0);
-        add_to(v->pose[b->frame], pose, POSE);
+        add_to(v->pose[frame_at(b->frame)], pose, POSE);
         add_weights(wp, b->mass, mass, 1);
         add_weights(wp, b->moments, moments, 3);
     }
 }
 
-static void frames_reverse(const double p[], const Chain *now, Chain *v, double wp[], double *w) {
+static void frames_reverse(const Sources sources, const Chain *now, ChainVariation *v, double wp[], double *w) {
     for (size_t i = LOOP_FRAME_COUNT - 1; i > 0; i--) {
         const LoopFrame *f = &LOOP_FRAMES[i];
-        double pose[POSE], inside[POSE], parent[PORT], child[PORT];
-        const double *parent_port = value(p, f->parent_port), *child_port = value(p, f->child_port);
+        double outer[POSE], pose[POSE], inside[POSE], parent[PORT], child[PORT];
+        const double *parent_port = value(sources, f->parent_port), *child_port = value(sources, f->child_port);
+        take(outer, &now->pose[f->parent], POSE);
         if (f->kind == FRAME_INSIDE) {
-            const double *from[] = {now->pose[f->parent], value(p, f->inside), parent_port, child_port, v->pose[i]};
+            const double *from[] = {outer, &LOOP_HELD[f->inside], parent_port, child_port, v->pose[i]};
             double *to[] = {pose, inside, parent, child};
             loop_hang_inside_reverse(from, to, NULL, w, 0);
         } else {
-            const double *from[] = {now->pose[f->parent], parent_port, child_port, v->pose[i]};
+            const double *from[] = {outer, parent_port, child_port, v->pose[i]};
             double *to[] = {pose, parent, child};
             loop_hang_reverse(from, to, NULL, w, 0);
         }
-        add_to(v->pose[f->parent], pose, POSE);
+        add_to(v->pose[frame_at(f->parent)], pose, POSE);
         add_weights(wp, f->parent_port, parent, PORT);
         add_weights(wp, f->child_port, child, PORT);
     }
@@ -323,22 +406,25 @@ static void frames_reverse(const double p[], const Chain *now, Chain *v, double 
 int composite_reverse(const double **arg, double **res, int *iw, double *w, int mem) {
     const double *p = arg[0];
     double *wp = res[0];
-    Chain *now = (Chain *)w, *v = now + 1;
+    Chain *now = (Chain *)w;
+    ChainVariation *v = (ChainVariation *)(now + 1);
+    const Sources sources = {p, LOOP_HELD};
+    One one;
     w += LOOP_WORK;
     put_together(p, now, w);
     memset(v, 0, sizeof *v);
     memset(wp, 0, INPUT_P_COUNT * sizeof(double));
-    const double *whole[] = {now->sum, now->seen[0], now->middle, now->inertia, arg[1]};
+    const double *whole[] = {now->sum, now->first, now->middle, now->inertia, arg[1]};
     double first[3], part[3], sum[4], inertia[6], mass[1], seen[SEEN];
     double *of_whole[] = {v->sum, first, v->middle, v->inertia};
     loop_finish_reverse(whole, of_whole, iw, w, mem);
     for (size_t j = 0; j < LOOP_BODY_COUNT; j++) {
-        const int index = LOOP_BODIES[j].mass;
-        const double *from[] = {now->inertia, value(p, index), now->seen[j], now->seen[0], now->middle, v->inertia};
+        const LoopBody *b = take_body(&one, sources, now, j);
+        const double *from[] = {now->inertia, one.mass, one.seen, now->first, now->middle, v->inertia};
         double of_middle[3];
         double *to[] = {inertia, mass, seen, part, of_middle};
         loop_add_reverse(from, to, iw, w, mem);
-        add_weights(wp, index, mass, 1);
+        add_weights(wp, b->mass, mass, 1);
         add_to(v->seen[j], seen, SEEN);
         add_to(first, part, 3);
         add_to(v->middle, of_middle, 3);
@@ -348,17 +434,17 @@ int composite_reverse(const double **arg, double **res, int *iw, double *w, int 
     loop_middle_reverse(of_middle, on_sum, iw, w, mem);
     add_to(v->sum, sum, 4);
     for (size_t j = 0; j < LOOP_BODY_COUNT; j++) {
-        const int index = LOOP_BODIES[j].mass;
-        const double *from[] = {now->sum, value(p, index), now->seen[j], now->seen[0], v->sum};
+        const LoopBody *b = take_body(&one, sources, now, j);
+        const double *from[] = {now->sum, one.mass, one.seen, now->first, v->sum};
         double *to[] = {sum, mass, seen, part};
         loop_weigh_reverse(from, to, iw, w, mem);
-        add_weights(wp, index, mass, 1);
+        add_weights(wp, b->mass, mass, 1);
         add_to(v->seen[j], seen, SEEN);
         add_to(first, part, 3);
     }
     add_to(v->seen[0], first, 3);
-    bodies_reverse(p, now, v, wp, w);
-    frames_reverse(p, now, v, wp, w);
+    bodies_reverse(sources, now, v, wp, w);
+    frames_reverse(sources, now, v, wp, w);
     return 0;
 }
 

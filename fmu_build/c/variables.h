@@ -34,7 +34,6 @@ typedef struct {
     double start;
     double nominal;
     Role role;
-    Check check;
     unsigned follows;
 #if DOCK_COUNT
     Type type; /* the values of a Boolean are 0 and 1 */
@@ -42,6 +41,13 @@ typedef struct {
 } Variable;
 
 /* Indexed by value reference: time, inputs (p, then torque), parameters, outputs, states, derivatives. */
+/* A check and the value reference at which it stands; the last one is CHECK_NONE. */
+typedef struct {
+    unsigned reference;
+    Check check;
+} Judged;
+
+extern const Judged JUDGED[];
 extern const Variable VARIABLES[VARIABLE_COUNT];
 
 extern const char MODEL_TOKEN[];

@@ -149,14 +149,15 @@ def lookup_in(scene: Scene, values: ca.SX, parts: tuple[str, ...]) -> Callable[[
 
     values : those of the inputs of these parts, in the order of the model description
     """
-    names = [variable.name for variable in input_variables(scene) if variable.part in parts]
-    symbols = dict(zip(names, ca.vertsplit(values), strict=True)) if names else {}
+    of_parts = [variable for variable in input_variables(scene) if variable.part in parts]
+    first: dict[str, int] = {}
+    for place, variable in enumerate(of_parts):
+        first.setdefault(variable.group, place)
 
     def lookup(group: str, value: ArrayLike) -> ca.SX:
-        if group in symbols:
-            return symbols[group]
-        if f"{group}[1]" in symbols:
-            return ca.vertcat(*(symbols[f"{group}[{i}]"] for i in (1, 2, 3)))
-        return constant(value)
+        if group not in first:
+            return constant(value)
+        place = first[group]
+        return values[place : place + (3 if of_parts[place].name.endswith("]") else 1)]
 
     return lookup

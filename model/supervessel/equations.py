@@ -9,6 +9,7 @@ constant in this scene is a number in those functions, not an argument that is r
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from math import frexp, ldexp
 
@@ -21,6 +22,7 @@ from supervessel.changes import Change, change_functions, lookup_in
 from supervessel.docking import composite_body
 from supervessel.inertia import Body, from_upper_triangle, ldl, ldl_inverse, upper_triangle
 from supervessel.interrupts import interrupt_afterwards
+from supervessel.latest import latest
 from supervessel.principal import principal, principal_forward, quaternion
 from supervessel.propagators import PROPAGATORS, Plan, plan_of
 from supervessel.propagators.bound import fastest_square
@@ -85,6 +87,8 @@ class Equations:
     themselves, to those of the results; _reverse takes weights of the results to those of the arguments.
     response is (state_ode, outputs); it takes z, u, c and a, the changes or weights are those of z, u, c.
 
+    composite_graph : p and c as expressions, of which the composite's derivatives are made
+
     z is the state of model exchange: x, or (attitude, angular momentum) where every change keeps that.
     state_ode      : z, u, c -> rate of z
     state_outputs  : z, u, c, a, e -> the outputs
@@ -102,8 +106,7 @@ class Equations:
     fastest_square: ca.Function
     step: ca.Function
     propagation: tuple[ca.Function, ...]
-    composite_forward: ca.Function
-    composite_reverse: ca.Function
+    composite_graph: tuple[ca.SX, ca.SX]
     response_forward: ca.Function
     response_reverse: ca.Function
     change: Change | None
@@ -119,18 +122,32 @@ class Equations:
     x_names: tuple[str, ...]
     y_names: tuple[str, ...]
 
+    @cached_property
+    def composite_derivatives(self) -> tuple[ca.Function, ca.Function]:
+        """composite_forward and composite_reverse; they are made when somebody asks."""
+        p, c = self.composite_graph
+        with interrupt_afterwards(), simplification(True):
+            forward, reverse = derivatives("composite", [p], [c]).values()
+        return forward, reverse
+
     @property
     def functions(self) -> tuple[ca.Function, ...]:
         """The functions that the FMU needs."""
-        always = (self.composite, self.state_ode, self.outputs, *self.propagation)
-        derivatives = (
-            self.composite_forward,
-            self.composite_reverse,
-            self.response_forward,
-            self.response_reverse,
-        )
+        return (self.composite, *self._motion, *self.composite_derivatives, *self._responses)
+
+    @property
+    def functions_beside_composite(self) -> tuple[ca.Function, ...]:
+        """Those of them that are not the composite or its derivatives."""
+        return (*self._motion, *self._responses)
+
+    @property
+    def _motion(self) -> tuple[ca.Function, ...]:
         found = (self.axes,) if self.axes_slices else ()
-        return (*always, *found, *derivatives, *self.changing)
+        return (self.state_ode, self.outputs, *self.propagation, *found)
+
+    @property
+    def _responses(self) -> tuple[ca.Function, ...]:
+        return (self.response_forward, self.response_reverse, *self.changing)
 
 
 def composite_slices() -> dict[str, slice]:
@@ -169,13 +186,10 @@ def equations(scene: Scene) -> Equations:
         tuple(variable.name for variable in inputs if variable.part == part)
         for part in ("shape", "contact", "action")
     )
-    p, k, u, x, h = (
-        ca.SX.sym(*s)
-        for s in (("p", len(p_names)), ("k", len(k_names)), ("u", len(u_names)), ("x", 7), ("h", 1))
-    )
+    k, u, x, h = (ca.SX.sym(*s) for s in (("k", len(k_names)), ("u", len(u_names)), ("x", 7), ("h", 1)))
 
     law, plan = LAWS[scene.rotation.law], plan_of(scene)
-    of_p = composite_parts(scene, p)
+    p, of_p = _composite_of_inputs(scene)
     where = _slices({name: part.numel() for name, part in of_p.items()})
     c_of_p = ca.densify(ca.vertcat(*of_p.values()))
     c = ca.SX.sym("c", c_of_p.numel())
@@ -233,7 +247,7 @@ def equations(scene: Scene) -> Equations:
         step=step,
         propagation=tuple(propagation),
         product_count=products.size2(),
-        **derivatives("composite", [p], [c_of_p]),
+        composite_graph=(p, c_of_p),
         **derivatives("response", state_args, [z_rate, y], (a, *_axes_change(inertia, c, a, slices))),
         change=change,
         changing=_changing(scene, change, by_momentum),
@@ -352,12 +366,17 @@ def p_start(scene: Scene) -> NDArray[np.float64]:
 @simplification(True)
 def composite_at_start(scene: Scene) -> dict[str, NDArray[np.float64]]:
     """Returns the parts of c by name, (n,) each, for the scene's own values of the inputs."""
-    start = p_start(scene)
-    p = ca.SX.sym("p", len(start))
-    parts = composite_parts(scene, p)
+    p, parts = _composite_of_inputs(scene)
     c = ca.Function("composite", [p], [ca.vertcat(*parts.values())])
-    values = np.array(c(start)).ravel()
+    values = np.array(c(p_start(scene))).ravel()
     return {name: values[where] for name, where in _slices({n: v.numel() for n, v in parts.items()}).items()}
+
+
+@latest
+def _composite_of_inputs(scene: Scene) -> tuple[ca.SX, dict[str, ca.SX]]:
+    """Returns p, and the parts of c as expressions of it: for the check of a scene and for its equations."""
+    p = ca.SX.sym("p", sum(variable.part == "shape" for variable in input_variables(scene)))
+    return p, composite_parts(scene, p)
 
 
 def composite_parts(scene: Scene, p: ca.SX) -> dict[str, ca.SX]:

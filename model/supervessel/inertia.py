@@ -113,7 +113,7 @@ def combine(bodies: Sequence[Body]) -> Body:
     inertia = ca.SX.zeros(3, 3)
     for body, offset in zip(bodies, offsets, strict=True):
         rho = offset - centre
-        inertia = inertia + body.inertia + body.mass * offset_tensor(rho)
+        inertia = inertia + (body.inertia + body.mass * offset_tensor(rho))
     if all(body.velocity is None for body in bodies):
         return Body(mass, first.centre + centre, inertia)
     moving = [
@@ -146,7 +146,7 @@ def combine_numbers(
     rho = offsets - centre[:, None]
     inertia = np.empty((3, 3))
     for i, j in UPPER_TRIANGLE:
-        terms = np.column_stack([inertias[i, j], masses * _offset_square(rho, i, j)])
+        terms = inertias[i, j] + masses * _offset_square(rho, i, j)
         inertia[i, j] = inertia[j, i] = np.cumsum(terms)[-1]
     return float(mass), centres[:, 0] + centre, inertia
 

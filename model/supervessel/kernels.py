@@ -30,19 +30,19 @@ def lane_kernels(scene: Scene) -> tuple[ca.Function, ...]:
 
     mated    : parent's port in its axes, child's port -> pose of the child in the parent's axes
     then     : pose of axes, pose in them -> pose in the outer axes
-    lever    : mass, centre, centre of the first body -> first moment about that
-    spread   : mass, centre, centre of the first body, middle -> inertia (6,) of the mass about the middle
+    lever    : mass, seen, centre of the first body -> first moment about that
+    spread   : mass, seen, centre of the first body, middle -> inertia (6,) about the middle
     fixed, scaled, free, diagonal, own_... : see `kernels`
     """
     pose, inside = _pose("pose"), _pose("inside")
-    parent, child = (ca.SX.sym(name, 9) for name in ("parent", "child"))
-    mass, centre, first, middle = ca.SX.sym("mass"), *(ca.SX.sym(n, 3) for n in ("centre", "first", "middle"))
+    parent, child, seen = (ca.SX.sym(name, 9) for name in ("parent", "child", "seen"))
+    mass, first, middle = ca.SX.sym("mass"), ca.SX.sym("first", 3), ca.SX.sym("middle", 3)
     steps = {
         "mated": ([parent, child], _flat(mated_pose(_port(parent), _port(child)))),
         "then": ([pose, inside], _flat(_as_pose(pose).then(_as_pose(inside)))),
         **_seen_bodies(scene),
-        "lever": ([mass, centre, first], _lever(mass, centre, first)),
-        "spread": ([mass, centre, first, middle], _spread(mass, centre, first, middle)),
+        "lever": ([mass, seen, first], _lever(mass, seen[:3], first)),
+        "spread": ([mass, seen, first, middle], _spread(mass, seen, first, middle)),
     }
     return tuple(ca.Function(name, arguments, [ca.densify(r)]) for name, (arguments, r) in steps.items())
 
@@ -85,7 +85,7 @@ def kernels(scene: Scene) -> tuple[ca.Function, ...]:
         "middle": ([total], total[1:] / total[0]),
         "add": (
             [inertia, mass, seen, first, middle],
-            inertia + seen[3:] + _spread(mass, seen[:3], first, middle),
+            inertia + _spread(mass, seen, first, middle),
         ),
         "finish": (
             [total, first, middle, inertia],
@@ -124,8 +124,8 @@ def _lever(mass: ca.SX, centre: ca.SX, first: ca.SX) -> ca.SX:
     return mass * (centre - first)
 
 
-def _spread(mass: ca.SX, centre: ca.SX, first: ca.SX, middle: ca.SX) -> ca.SX:
-    return mass * upper_triangle(offset_tensor(centre - first - middle))
+def _spread(mass: ca.SX, seen: ca.SX, first: ca.SX, middle: ca.SX) -> ca.SX:
+    return seen[3:] + mass * upper_triangle(offset_tensor(seen[:3] - first - middle))
 
 
 def _pose(name: str) -> ca.SX:

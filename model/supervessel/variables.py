@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from supervessel import reference
+from supervessel.latest import latest
 from supervessel.scene import VARIABLE_UNITS, Scene, input_groups, keeps_momentum
 
 
@@ -87,27 +88,22 @@ VESSEL_OUTPUT_DESCRIPTIONS = {
 RATE_UNITS = {"": "1/s", "rad/s": "rad/s2", "N.m.s": "N.m"}
 
 
+@latest
 def input_variables(scene: Scene) -> tuple[InputVariable, ...]:
     """Returns the inputs in the order of the model description: shape, contact, action."""
     inputs = scene.inputs
     variables = []
     for group, size in input_groups(dict(inputs)).items():
         owner, _, kind = group.rpartition(".")
-        for index in range(1, size + 1) if size else (0,):
-            name = f"{group}[{index}]" if index else group
-            lowest = 0.0 if kind in ("mass", "pmi") else None
-            low, high = inputs.range.get(name, inputs.range.get(group, (lowest, None)))
-            variables.append(
-                InputVariable(
-                    name,
-                    VARIABLE_UNITS[kind],
-                    _input_description(scene, owner, kind, index),
-                    _start(scene, owner, kind, index),
-                    low,
-                    high,
-                    part=_part(scene, owner, kind),
-                )
-            )
+        unit, part = VARIABLE_UNITS[kind], _part(scene, owner, kind)
+        description, start = _input_description(scene, owner, kind), _start(scene, owner, kind)
+        lowest = 0.0 if kind in ("mass", "pmi") else None
+        span = inputs.range.get(group, (lowest, None))
+        for i in range(size or 1):
+            name = f"{group}[{i + 1}]" if size else group
+            low, high = inputs.range.get(name, span)
+            text = description.format(AXES[i]) if size else description
+            variables.append(InputVariable(name, unit, text, start[i], low, high, part=part))
     return tuple(variables)
 
 
@@ -117,47 +113,52 @@ def _part(scene: Scene, owner: str, kind: str) -> Part:
     return "contact" if kind in ("velocity", "rate") and owner in scene.inputs.docked else "shape"
 
 
-def _start(scene: Scene, owner: str, kind: str, index: int) -> float:
-    """Returns the scene's value of an input; `index` counts from 1, 0 for a scalar."""
+def _start(scene: Scene, owner: str, kind: str) -> tuple[float, ...]:
+    """Returns the scene's value of an input, element by element."""
     if kind in ("torque", "force", "velocity", "rate"):
-        return 0.0
+        return (0.0, 0.0, 0.0)
     if kind == "docked":
-        return float(scene.dock(owner).docked)
+        return (float(scene.dock(owner).docked),)
     if kind == "mass":
-        return scene.vessels[owner].mass
-    if kind == "pmi":
-        pmi = scene.vessels[owner].pmi
-        assert pmi is not None
-        return pmi[index - 1]
-    value: tuple[float, ...] = getattr(scene.port(owner), kind)
-    return value[index - 1]
+        return (scene.vessels[owner].mass,)
+    value: tuple[float, ...] | None = (
+        scene.vessels[owner].pmi if kind == "pmi" else getattr(scene.port(owner), kind)
+    )
+    assert value is not None
+    return value
 
 
-def _input_description(scene: Scene, owner: str, kind: str, index: int) -> str:
-    axis = AXES[index - 1]
+PORT_DESCRIPTIONS = {
+    "position": "position of docking port {}",
+    "direction": "approach direction of docking port {}, outward",
+    "alignment": "alignment direction of docking port {}",
+    "velocity": "rate of change of the position of docking port {}",
+    "rate": "angular velocity of docking port {}",
+    "force": "external force at {}",
+}
+
+
+def _input_description(scene: Scene, owner: str, kind: str) -> str:
+    """Returns what an input is, {} where the axis of an element goes."""
     vessel = owner.partition(".")[0]
     if owner in scene.inputs.docked:
         first, second = scene.dock(owner).ports
         meeting = (
-            f"at contact, of {second} relative to {first}, {axis} in the axes of {first.partition('.')[0]}"
+            f"at contact, of {second} relative to {first}, {{}} in the axes of {first.partition('.')[0]}"
         )
         return {
             "docked": f"whether {first} and {second} are docked",
             "velocity": f"velocity {meeting}",
             "rate": f"angular velocity {meeting}",
         }[kind]
+    if kind in PORT_DESCRIPTIONS:
+        return f"{PORT_DESCRIPTIONS[kind].format(owner)}, {{}} in the axes of {vessel}"
     return {
         "mass": f"mass of {owner}",
-        "pmi": f"mass-normalised moment of inertia of {owner} about its {axis} axis",
-        "position": f"position of docking port {owner}, {axis} in the axes of {vessel}",
-        "direction": f"approach direction of docking port {owner}, outward, {axis} in the axes of {vessel}",
-        "alignment": f"alignment direction of docking port {owner}, {axis} in the axes of {vessel}",
-        "velocity": f"rate of change of the position of docking port {owner}, {axis} in the axes of {vessel}",
-        "rate": f"angular velocity of docking port {owner}, {axis} in the axes of {vessel}",
-        "torque": f"external torque on {owner}, {axis} in its axes"
+        "pmi": f"mass-normalised moment of inertia of {owner} about its {{}} axis",
+        "torque": f"external torque on {owner}, {{}} in its axes"
         if owner
-        else f"external torque about the barycentre, {axis} in body axes",
-        "force": f"external force at {owner}, {axis} in the axes of {vessel}",
+        else "external torque about the barycentre, {} in body axes",
     }[kind]
 
 
@@ -187,6 +188,7 @@ def output_names(scene: Scene) -> tuple[str, ...]:
     return tuple(name for group in scene.outputs.names for name, _ in _elements(group))
 
 
+@latest
 def output_variables(scene: Scene) -> tuple[Variable, ...]:
     """Returns the outputs that the scene lists, in its order, vectors and tensors element by element."""
     nominal = _output_nominals(scene)
@@ -207,6 +209,7 @@ def _output_description(group: str) -> str:
     return VESSEL_OUTPUT_DESCRIPTIONS[output].format(vessel) if vessel else OUTPUT_DESCRIPTIONS[group]
 
 
+@latest
 def _output_nominals(scene: Scene) -> dict[str, float]:
     """Returns magnitudes of outputs at the start."""
     whole = reference.composite(scene)

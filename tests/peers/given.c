@@ -5,18 +5,19 @@
 
 /* Returns the nanoseconds of one evaluation, beside which `plain` gets those of a plain RK4 step. */
 double time_given(const double p[], double c[], double *w, long repeats, double *plain) {
+    const Sources sources = {p, LOOP_HELD};
     Chain *now_at = (Chain *)w;
     double *res[] = {c}, sink = 0.0;
     *plain = time_plain(2000, &sink);
     put_together(p, now_at, w + LOOP_WORK);
     const double begun = now();
     for (long i = 0; i < repeats; i++) {
-        sum_masses(p, now_at);
+        sum_masses(sources, now_at);
         const double *sum[] = {now_at->sum};
         double *middle[] = {now_at->middle};
         loop_middle(sum, middle, NULL, w + LOOP_WORK, 0);
         sum_inertia(now_at);
-        const double *whole[] = {now_at->sum, now_at->seen[0], now_at->middle, now_at->inertia};
+        const double *whole[] = {now_at->sum, now_at->first, now_at->middle, now_at->inertia};
         loop_finish(whole, res, NULL, w + LOOP_WORK, 0);
     }
     return 1e9 * (now() - begun) / (double)repeats + 0.0 * sink;

@@ -13,6 +13,9 @@ from supervessel.scene import ORIGIN, Dock, Scene
 
 Array = NDArray[np.float64]
 
+FOLLOWING, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+"""Of each axis the next one, and the one after that."""
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -152,8 +155,7 @@ def port_axes(direction: ArrayLike, alignment: ArrayLike) -> Array:
 
 def _cross(a: Array, b: Array) -> Array:
     """Returns a x b along the last axis; numpy's own takes ten times as long for a single vector."""
-    following, last = [1, 2, 0], [2, 0, 1]
-    product: Array = a[..., following] * b[..., last] - a[..., last] * b[..., following]
+    product: Array = a[..., FOLLOWING] * b[..., LAST] - a[..., LAST] * b[..., FOLLOWING]
     return product
 
 
@@ -266,8 +268,9 @@ def _mated(parent: Motion, here: _MovingPort, there: _MovingPort) -> Motion:
 def vector(group: str, start: ArrayLike, values: Mapping[str, float] | None) -> Array:
     """Returns the three elements of an input, (3,), from `values` or, where it lacks them, from `start`."""
     numbers = np.array(start, dtype=float)
-    for i in range(3):
-        numbers[i] = (values or {}).get(f"{group}[{i + 1}]", numbers[i])
+    if values:
+        for i in range(3):
+            numbers[i] = values.get(f"{group}[{i + 1}]", numbers[i])
     return numbers
 
 
