@@ -42,7 +42,7 @@ enum { INSTANTIATED = 1, INITIALIZATION = 2, STEPPING = 4, EVENT = 8, CONTINUOUS
 enum { NO_STEPS = 64 }; /* of model exchange only */
 enum { BEFORE_START = INSTANTIATED | INITIALIZATION, EXCHANGING = EVENT | CONTINUOUS, RUNNING = STEPPING | EXCHANGING };
 enum { SLOTS = 6, SAVED = 3, BLOBS = 4, MOST = 12, PATIENCE = 60 };
-enum { INPUT_COUNT = INPUT_P_COUNT + INPUT_K_COUNT + INPUT_U_COUNT, HAS_EVENT_MODE = FMI == 3 && DOCKED_COUNT > 0 };
+enum { INPUT_COUNT = INPUT_P_COUNT + INPUT_K_COUNT + INPUT_U_COUNT, HAS_EVENT_MODE = FMI == 3 && DOCK_COUNT > 0 };
 
 static const double UNIT_TOLERANCE = 8.0 * DBL_EPSILON; /* 2 EPSILON a component, and the norm's own rounding */
 
@@ -150,7 +150,7 @@ static double value_for(unsigned reference) {
 }
 
 static bool is_boolean(unsigned reference) {
-#if DOCKED_COUNT
+#if DOCK_COUNT
     return reference < VARIABLE_COUNT && VARIABLES[reference].type == TYPE_BOOLEAN;
 #else
     (void)reference;
@@ -236,7 +236,7 @@ static int set_values(Slot *slot, const unsigned references[], size_t count, con
 #endif
 }
 
-#if DOCKED_COUNT
+#if DOCK_COUNT
 
 typedef EITHER(fmi2Boolean, fmi3Boolean) Boolean;
 
@@ -563,7 +563,7 @@ static Answer set_good_inputs(Slot *slot) {
     return answer;
 }
 
-#if DOCKED_COUNT
+#if DOCK_COUNT
 
 static unsigned boolean_reference(void) {
     unsigned reference = below(VARIABLE_COUNT);
@@ -878,7 +878,7 @@ static Answer update_discrete_states(Slot *slot) {
     return answer;
 }
 
-#if FMI == 3 && DOCKED_COUNT
+#if FMI == 3 && DOCK_COUNT
 static Answer step_mode(Slot *slot) {
     Answer answer = {OK, expect_of(slot, false, EVENT, true)};
     called = "fmi3EnterStepMode";
@@ -893,7 +893,7 @@ static Answer change_mode(Slot *slot) {
     const unsigned before_event = EITHER(EXCHANGING, CONTINUOUS) | (slot->events ? STEPPING : 0);
     const bool wants_event = slot->exchange ? once_in(2) : slot->now.state != EVENT;
     if (!slot->exchange && !slot->events && !once_in(50)) return NOTHING;
-#if FMI == 3 && DOCKED_COUNT
+#if FMI == 3 && DOCK_COUNT
     if (slot->events && slot->now.state == EVENT ? !once_in(50) : once_in(50)) return step_mode(slot);
     if (slot->events && slot->now.state == STEPPING && !once_in(8)) return NOTHING;
 #endif
@@ -1017,7 +1017,7 @@ static Answer deserialize(Slot *slot) {
 
 /* Functions of what the FMU does not have; all in this version's header that are not called above. */
 
-#if DOCKED_COUNT
+#if DOCK_COUNT
 #define BOOLEAN(X)
 #else
 #define BOOLEAN(X) X(Boolean)
@@ -1081,7 +1081,7 @@ static Answer unsupported(Slot *slot) {
     CALL(SetShiftDecimal, (component, NULL, 1, NULL))
     CALL(SetShiftFraction, (component, NULL, 1, NULL, NULL))
     CALL(EvaluateDiscreteStates, (component))
-#if !DOCKED_COUNT
+#if !DOCK_COUNT
     CALL(EnterStepMode, (component))
 #endif
     CALL(ActivateModelPartition, (component, 0, 0.0))
@@ -1135,7 +1135,7 @@ static bool comparable(const Slot *slot, unsigned state, int status, unsigned re
 static void read_all(Slot *slot, unsigned state, int status, double values[]) {
     for (unsigned i = 0; i < VARIABLE_COUNT; i++) {
         values[i] = 0.0;
-#if DOCKED_COUNT
+#if DOCK_COUNT
         Boolean value = 0;
         if (is_boolean(i)) {
             values[i] = get_booleans(slot, &i, 1, &value, 1) != OK ? -12345.0 : value ? 1.0 : 0.0;
@@ -1230,7 +1230,7 @@ static const struct {
     {get, 6, EITHER(ALL & ~INSTANTIATED, ALL)},
     {set, 6, ALL & ~TERMINATED},
     {set_good_inputs, 3, ALL & ~TERMINATED},
-#if DOCKED_COUNT
+#if DOCK_COUNT
     {get_some_booleans, 2, EITHER(ALL & ~INSTANTIATED, ALL)},
     {set_some_booleans, 4, ALL & ~TERMINATED},
 #endif
