@@ -8,10 +8,11 @@ from pathlib import Path
 
 from fmu_build.build import build_fmu
 from fmu_build.errors import BuildError
-from fmu_build.platforms import PLATFORMS, platforms_named
+from fmu_build.platforms import PLATFORMS, Platform, platforms_named
 from supervessel import Scene, SceneError, choose, load_scene
 from supervessel.accuracy import said
 from supervessel.console import print_results, show_progress
+from supervessel.interrupts import interrupted_once
 from supervessel.trade import TradeError
 
 
@@ -41,6 +42,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         platforms = platforms_named(options.platform)
     except ValueError as error:
         parser.error(f"--platform: {error}")
+    with interrupted_once():
+        return _build(options, platforms)
+
+
+def _build(options: argparse.Namespace, platforms: Sequence[Platform]) -> int:
+    """Builds what the options ask for; returns the exit status."""
     try:
         scene = load_scene(options.scene)
         output = options.output or Path(f"{scene.name}.fmu")

@@ -4,7 +4,6 @@ import json
 import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ from fmu_build.table import Entry, variable_table
 from fmu_build.terminals import terminals_and_icons
 from supervessel.accuracy import choose
 from supervessel.equations import Equations, equations
+from supervessel.processes import Workers
 from supervessel.scene import Scene
 from supervessel.trade import TradeError
 
@@ -62,7 +62,7 @@ def build_fmu(scene: Scene, output: str | Path, fmi: int = 3, platforms: Sequenc
     entries = variable_table(scene, model)
     sources, description = _generated(scene, model, entries, fmi)
     packed = source_files(sources, fmi, scene.name)
-    with ThreadPoolExecutor(1) as aside:  # the compiler is a process of its own
+    with Workers(1) as aside:  # the compiler is a process of its own
         names = source_file_names(sources, fmi)
         binaries = aside.submit(compile_sources, packed, names, fmi, platforms, scene.name)
         beside = companions(scene, model, entries, fmi, evidence)

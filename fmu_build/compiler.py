@@ -8,13 +8,14 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from fmu_build.errors import BuildError
 from fmu_build.platforms import PLATFORMS, Platform, library_contents
 from fmu_build.universal import universal_library
+from supervessel.processes import Workers, run
 
 TIME_LIMIT = 1800.0  # s; a first build for Windows compiles its C runtime: minutes on two busy cores
 
@@ -77,7 +78,7 @@ def _thin_libraries(
             return library.read_bytes()
 
     libraries, problems = {}, []
-    with ThreadPoolExecutor(AT_ONCE) as pool:
+    with Workers(AT_ONCE) as pool:
         for platform, result in [(platform, pool.submit(compiled, platform)) for platform in platforms]:
             try:
                 libraries[platform] = result.result()
@@ -112,23 +113,32 @@ def compile_library(
         raise BuildError(f"compiler for {platform.name} {problem}")
 
 
+@functools.cache
+def _sweep(cache: Path) -> None:
+    """Removes what compilers that were ended have left in their cache; those that run are younger."""
+    for left in (cache / "tmp").glob("*"):
+        try:
+            old = time.time() - left.stat().st_mtime > 2.0 * TIME_LIMIT
+        except FileNotFoundError:  # another program was faster
+            continue
+        if old and left.is_dir():
+            shutil.rmtree(left, ignore_errors=True)
+        elif old:
+            left.unlink(missing_ok=True)
+
+
 def _run(command: Sequence[str], folder: Path | None) -> str | None:
     """Runs the compiler and returns what it did instead of compiling, if so."""
-    cache = str(compiler_cache())
+    cache = compiler_cache()
+    _sweep(cache)
+    kept_in = {"ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": str(cache)}
     try:
-        done = subprocess.run(
-            command,
-            cwd=folder,
-            env=os.environ | {"ZIG_GLOBAL_CACHE_DIR": cache, "ZIG_LOCAL_CACHE_DIR": cache},
-            capture_output=True,
-            encoding="utf-8",
-            errors="replace",
-            timeout=TIME_LIMIT,
-            check=False,
-        )
+        done = run(command, TIME_LIMIT, folder, os.environ | kept_in)
     except subprocess.TimeoutExpired:
         return f"did not end within {TIME_LIMIT:g} s; its cache is {cache}"
-    return f"failed:\n{(done.stderr or done.stdout).strip()}" if done.returncode else None
+    if done.returncode == 0:
+        return None
+    return f"failed:\n{(done.stderr or done.stdout).strip()}\nThe compiler's cache is {cache}"
 
 
 def compiler_cache() -> Path:

@@ -8,12 +8,14 @@ import argparse
 import json
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from typing import get_args
 
 from supervessel.console import print_results, show_progress
+from supervessel.interrupts import interrupted_once
 from supervessel.loading import load_scene, parse_scene
 from supervessel.orbiter import ScenarioError, import_scenario
 from supervessel.problems import SceneError
@@ -29,11 +31,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _add_import(commands.add_parser("import", help="make a scene file from Orbiter's files"))
     _add_trade(commands.add_parser("trade", help="measure what accuracy costs in a scene"))
     options = parser.parse_args(arguments)
-    try:
-        return int(options.run(options))
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return 1
+    with interrupted_once():
+        try:
+            return int(options.run(options))
+        except KeyboardInterrupt:
+            print("interrupted", file=sys.stderr)
+            return 1
 
 
 def _add_import(parser: argparse.ArgumentParser) -> None:
@@ -94,7 +97,7 @@ def _add_trade(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "Build the FMUs of a scene under every sensible law, propagator and step, fly its [experiment] with "
         "each, compare with references, time: tables on stdout; these, a work-precision plot and all figures "
-        "in a folder. What has been flown is kept in the user's cache: the same again takes no time."
+        "in a folder. What has been flown is kept in the user's cache: the same again takes seconds."
     )
     parser.add_argument("scene", type=Path, metavar="SCENE.toml", help="the scene file")
     parser.add_argument(
@@ -115,15 +118,17 @@ def _trade(options: argparse.Namespace) -> int:
         scene = _lasting(without_accuracy(load_scene(options.scene)), options.duration)
         folder: Path = options.output or Path(f"{scene.name}_trade")
         course_of(scene)
-        write_all(folder, {})
-        found = study(scene, quick=options.quick, progress=_progress)
-        tables = table(found)
-        files = {"trade.json": json.dumps(found, indent=1).encode(), "trade.md": f"{tables}\n".encode()}
-        try:
-            files |= {f"trade.{kind}": drawn for kind, drawn in plot(found).items()}
-        except ImportError:
-            print("no plot: matplotlib is not installed, pip install 'supervessel[plot]'", file=sys.stderr)
-        write_all(folder, files)
+        with _made(folder):
+            found = study(scene, quick=options.quick, progress=_progress)
+            tables = table(found)
+            files = {"trade.json": json.dumps(found, indent=1).encode(), "trade.md": f"{tables}\n".encode()}
+            try:
+                files |= {f"trade.{kind}": drawn for kind, drawn in plot(found).items()}
+            except ImportError:
+                print(
+                    "no plot: matplotlib is not installed, pip install 'supervessel[plot]'", file=sys.stderr
+                )
+            write_all(folder, files)
     except (SceneError, BuildError) as error:
         print(error, file=sys.stderr)
         return 1
@@ -136,6 +141,18 @@ def _trade(options: argparse.Namespace) -> int:
         )
         return 1
     return print_results(f"{tables}\n\n{folder}", f"the trade is written to {folder}, its tables")
+
+
+@contextmanager
+def _made(folder: Path) -> Iterator[None]:
+    """Makes a folder, unless it is there; takes it away again if nothing comes into it."""
+    there = folder.exists()
+    write_all(folder, {})
+    try:
+        yield
+    finally:
+        if not there and not any(folder.iterdir()):
+            folder.rmdir()
 
 
 def _lasting(scene: Scene, duration: float | None) -> Scene:

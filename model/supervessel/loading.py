@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from supervessel.assembly import TooManyWaysError
 from supervessel.consistency import consistency_problems
 from supervessel.equations import composite_at_start
-from supervessel.naming import naming_problems
+from supervessel.naming import misnamed_courses, naming_problems
 from supervessel.problems import SceneError, quantity, unknown
 from supervessel.scene import Scene, known_keys
 from supervessel.variables import input_variables
@@ -67,7 +67,10 @@ def parse_scene(raw: Mapping[str, Any], source: str = "scene") -> Scene:
     try:
         scene = Scene.model_validate(raw)
     except ValidationError as error:
-        problems += [text for one in error.errors() for text in _explain(one)]
+        misnamed = {("experiment", "inputs", name) for name in misnamed_courses(raw)}
+        problems += [
+            text for one in error.errors() if one["loc"][:3] not in misnamed for text in _explain(one)
+        ]
     problems += naming_problems(raw) + consistency_problems(raw)
     if scene is None or problems:
         raise SceneError(source, problems)
@@ -122,15 +125,16 @@ def _course_problems(scene: Scene) -> list[str]:
     variables = {variable.name: variable for variable in input_variables(scene)}
     for name, rows in scene.experiment.inputs.items() if scene.experiment else ():
         variable, kind = variables[name], name.rpartition(".")[2].partition("[")[0]
-        low, high = variable.low, variable.high
+        low, high, boolean = variable.low, variable.high, variable.boolean
         allowed = f"outside inputs.range = {quantity((low, high), variable.unit)}"
-        if variable.boolean:
-            low, high, allowed = 0.0, 1.0, "must be true or false"
-        elif low is None or high is None:
+        if low is None or high is None:
             allowed = f"a {'mass' if kind == 'mass' else 'moment'} must be >= 0 {variable.unit}"
         for time, value in rows:
             outside = (low is not None and value < low) or (high is not None and value > high)
-            if outside or (variable.boolean and value not in (0.0, 1.0)):
+            if boolean is not isinstance(value, bool):
+                must = "must be true or false" if boolean else "must be a finite number"
+                problems.append(f'experiment.inputs."{name}": {quantity(value)} at {time} s: {must}')
+            elif outside:
                 found = quantity(value, variable.unit)
                 problems.append(f'experiment.inputs."{name}": {found} at {time} s: {allowed}')
     return problems

@@ -43,7 +43,7 @@ def naming_problems(raw: Mapping[str, Any]) -> list[str]:
         *_docks(raw, ports),
         *_inputs(raw, ports),
         *_ranges(raw),
-        *_courses(raw),
+        *misnamed_courses(raw).values(),
         *_outputs(raw, ports),
     ]
 
@@ -231,19 +231,27 @@ def _groups(raw: Mapping[str, Any]) -> dict[str, int]:
     return input_groups(lists | {"torque": inputs.get("torque")})
 
 
-def _courses(raw: Mapping[str, Any]) -> Iterator[str]:
-    known = [
-        f"{name}[{i}]" if i else name
-        for name, size in _groups(raw).items()
-        for i in (range(1, size + 1) if size else (0,))
-    ]
+def misnamed_courses(raw: Mapping[str, Any]) -> dict[str, str]:
+    """Returns what is wrong with names in experiment.inputs, by name; what stands there is not looked at."""
+    groups = _groups(raw)
+    elements = {
+        name: [f"{name}[{i}]" for i in range(1, size + 1)] if size else [name]
+        for name, size in groups.items()
+    }
+    known = [name for names in elements.values() for name in names]
+    problems = {}
     for name, rows in _table(_table(raw, "experiment"), "inputs").items():
-        if isinstance(rows, Mapping):
+        if groups.get(name):
+            quoted = ", ".join(f'"{one}"' for one in elements[name])
+            rule = "the elements of a vector are given one by one"
+            problems[name] = f'experiment.inputs."{name}": {rule}: {quoted}'
+        elif isinstance(rows, Mapping):
             quoted = ", ".join(f'"{name}.{key}"' for key in rows)
             rule = "the name of an input stands in quotes here"
-            yield f"experiment.inputs.{name}: {rule}: {quoted} = [[time, value]]"
+            problems[name] = f"experiment.inputs.{name}: {rule}: {quoted} = [[time, value]]"
         elif name not in known:
-            yield f"experiment.inputs: {unknown('input', name, known)}"
+            problems[name] = f"experiment.inputs: {unknown('input', name, known)}"
+    return problems
 
 
 def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:

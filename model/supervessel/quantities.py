@@ -125,12 +125,12 @@ def _direction(value: Any) -> Vector:
     return x, y, z
 
 
-def _course(value: object) -> tuple[tuple[float, float], ...]:
+def _course(value: object) -> tuple[tuple[float, float | bool], ...]:
     """Returns how an input moves: rows of time [s] and value; two at one time are a jump."""
     where = f" = {quantity(value)}: must be "
     if not (isinstance(value, list | tuple) and value and all(map(_is_row, value))):
         raise ValueError(where + "rows [time in s, value] of finite numbers, at least one")
-    rows = tuple((float(time), float(number)) for time, number in value)
+    rows = tuple((float(time), x if isinstance(x, bool) else float(x)) for time, x in value)
     times = [time for time, _ in rows]
     if times[0] < 0.0:
         raise ValueError(f"{where}from time 0 s on, but begins at {times[0]} s")
@@ -164,7 +164,7 @@ Angle = Annotated[float, number("rad", "a number from 1e-6 to 1", 1e-6, 1.0)]
 AttitudeError = Annotated[float, number("rad", "a number from 1e-15, what doubles tell, to 1", 1e-15, 1.0)]
 RateError = Annotated[float, number("rad/s", "a finite number > 0", 0.0, open_low=True)]
 Tolerance = Annotated[float, number("", "a number from 1e-15 to 0.1", 1e-15, 0.1)]
-Course = Annotated[tuple[tuple[float, float], ...], BeforeValidator(_course)]
+Course = Annotated[tuple[tuple[float, float | bool], ...], BeforeValidator(_course)]
 Bounds = Annotated[tuple[float, float], vector("", "two finite numbers [low, high]", size=2)]
 
 

@@ -221,7 +221,8 @@ class Experiment(Table):
     """The default experiment: duration [s], communication step [s]; what `supervessel trade` flies.
 
     inputs : rows of time [s] and value by an input's name; linear between them, held before the first and
-             after the last, jumping where two have the same time. Others keep the scene's values.
+             after the last, jumping where two have the same time; a dock's values are true and false. Others
+             keep the scene's values.
     """
 
     duration: Seconds

@@ -203,6 +203,7 @@ def test_a_compiler_that_fails_is_quoted_on_stderr(folder):
     done = run(folder, "ball.toml", ZIG_LIB_DIR=folder / "ball.toml")
     assert done.stderr.startswith("compiler for ")
     assert "unable to open zig lib directory" in done.stderr
+    assert done.stderr.splitlines()[-1].startswith("The compiler's cache is ")
     assert "Traceback" not in done.stderr
     assert (done.returncode, done.stdout, files(folder)) == (1, "", ["ball.toml"])
 

@@ -1,7 +1,9 @@
 """`supervessel trade`: what it prints and leaves, what it refuses, and that an interrupt loses nothing."""
 
 import json
+import os
 import sys
+import time
 
 import pytest
 
@@ -35,17 +37,22 @@ def files(folder):
 
 @pytest.fixture(scope="module")
 def interrupted(tmp_path_factory, cache):
-    """A trade interrupted when it has its first results: its end, its folder, and what it has kept."""
+    """A trade interrupted when it has its first results: its end, what is there, and what it has kept."""
     folder = tmp_path_factory.mktemp("work")
     (folder / "ball.toml").write_text(SCENE)
     words = command("ball.toml", "--quick", "-o", "out")
     done, kept = processes.interrupted(words, folder, cache, "trade")
-    return done, files(folder / "out"), kept
+    return done, files(folder), kept
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory, cache, interrupted):
-    """The same trade from its beginning: its end and its folder."""
+    """The same trade from its beginning, compilers having left files: its end and its folder."""
+    for name, age in (("old.o.tmp", 7200.0), ("young.o.tmp", 60.0)):
+        left = cache / "tmp" / name
+        left.parent.mkdir(parents=True, exist_ok=True)
+        left.touch()
+        os.utime(left, (time.time() - age, time.time() - age))
     folder = tmp_path_factory.mktemp("work")
     (folder / "ball.toml").write_text(SCENE)
     return run(command("ball.toml", "--quick", "-o", "out"), folder, cache), folder
@@ -56,11 +63,11 @@ def test_an_interrupt_leaves_no_files_and_keeps_whole_results(interrupted):
     done, left, kept = interrupted
     message = "interrupted; what has been flown is kept, the same command goes on from there"
     assert (done.returncode, done.stdout, done.stderr.strip()) == (1, "", message)
-    assert left == []
+    assert left == ["ball.toml"]
     assert kept
     for path, content in kept.items():
         assert path.name.endswith(".json")
-        assert len(json.loads(content)["samples"]) == 10  # each of ten steps
+        assert len(json.loads(content)["kept"]["samples"]) == 10  # each of ten steps
 
 
 @needs_posix
@@ -72,6 +79,11 @@ def test_the_same_command_goes_on_from_what_was_kept(interrupted, finished, cach
     assert len(list(cache.glob("trade/*"))) > len(interrupted[2])
 
 
+def test_what_compilers_left_long_ago_is_removed(finished, cache):
+    """An hour ago none that still runs had begun."""
+    assert [path.name for path in (cache / "tmp").glob("*.o.tmp")] == ["young.o.tmp"]
+
+
 def test_tables_are_printed_and_all_is_in_the_folder(finished):
     done, folder = finished
     assert (done.returncode, done.stderr) == (0, "")
@@ -81,7 +93,7 @@ def test_tables_are_printed_and_all_is_in_the_folder(finished):
     assert (folder / "out" / "trade.md").read_text() == f"{table(found)}\n"
     assert found["experiment"] == {"duration": 10.0, "step": 1.0, "inputs": {}}
     divided = [(row["settings"], row["sub_steps"]) for row in found["choices"] if row["propagator"] == "rk4"]
-    assert divided == 2 * [(["0.05", "0.2"], 10), (["0.01"], 40)]  # 0.037 rad a step, under two laws
+    assert divided == 2 * [([0.05, 0.2], 10), ([0.01], 40)]  # 0.037 rad a step, under two laws
 
 
 def test_a_second_call_gives_the_same_bytes(finished, cache):
@@ -101,6 +113,15 @@ def test_a_full_disk_leaves_the_old_files_as_they_are(finished, cache):
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr == "ball.toml: out: cannot be written: File too large\n"
     assert {path.name: path.read_bytes() for path in (folder / "out").iterdir()} == before
+
+
+@needs_posix
+def test_a_full_disk_leaves_no_new_folder(finished, cache):
+    _, folder = finished
+    limited = f"ulimit -f 8 && exec {' '.join(command('ball.toml', '--quick', '-o', 'new'))}"
+    done = run(["sh", "-c", limited], folder, cache)
+    assert done.stderr == "ball.toml: new: cannot be written: File too large\n"
+    assert not (folder / "new").exists()
 
 
 @pytest.mark.parametrize(

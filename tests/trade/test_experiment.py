@@ -23,7 +23,22 @@ def moved(inputs, **changes):
     ("inputs", "problem"),
     [
         ({"DG.mas": [[0, 1]]}, 'experiment.inputs: unknown input "DG.mas" (did you mean "DG.mass"?)'),
-        ({"torque": [[0, 1]]}, 'experiment.inputs: unknown input "torque" (did you mean "torque[3]"?)'),
+        *(
+            (
+                {"torque": rows},
+                'experiment.inputs."torque": the elements of a vector are given one by one: '
+                '"torque[1]", "torque[2]", "torque[3]"',
+            )
+            for rows in ([[0, 1]], [[0, 1, 0, 0]], {"1": [[0, 1]]})
+        ),
+        (
+            {"DG": {"mass": [[0, 1]]}},
+            'experiment.inputs.DG: the name of an input stands in quotes here: "DG.mass" = [[time, value]]',
+        ),
+        (
+            {"DG.mass": [[0, 24500], [5, True]]},
+            'experiment.inputs."DG.mass": true at 5.0 s: must be a finite number',
+        ),
         (
             {"DG.mass": []},
             'experiment.inputs."DG.mass" = []: must be rows [time in s, value] of finite numbers, '
@@ -70,9 +85,18 @@ def test_a_dock_opens_and_closes_as_true_and_false_say():
     raw["inputs"] |= {"docked": ["berth"], "pose": []}
     course = course_of(parse_scene(raw))
     assert course.booleans["berth.docked"].tolist() == [1, 1, 0, 0, 1, 1, 1, 1, 1, 1]
-    raw["experiment"]["inputs"]["berth.docked"] = [[0, 0.5]]
-    with pytest.raises(SceneError, match=r"0\.5 at 0\.0 s: must be true or false"):
-        parse_scene(raw)
+    for value in (0, 1, 0.5):
+        raw["experiment"]["inputs"]["berth.docked"] = [[0, value]]
+        with pytest.raises(SceneError, match=rf"{float(value)} at 0\.0 s: must be true or false"):
+            parse_scene(raw)
+
+
+def test_a_scene_whose_docks_move_is_the_same_when_it_is_read_from_its_own_tables():
+    docks = [{"name": "berth", "ports": ["ISS.P2", "DG.nose"]}]
+    raw = moved({"berth.docked": [[0, True], [2, False]], "torque[1]": [[0, 1], [1, 0]]}, docks=docks)
+    raw["inputs"] |= {"docked": ["berth"], "pose": []}
+    scene = parse_scene(raw)
+    assert parse_scene(scene.model_dump(exclude_none=True)) == scene
 
 
 def test_an_input_is_linear_between_rows_and_holds_its_ends():

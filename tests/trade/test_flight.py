@@ -8,7 +8,7 @@ from fmu_build.platforms import host_platform
 from supervessel import parse_scene
 from supervessel.trade.choices import BEST, Choice, Model, models, reference_choices, variant_of
 from supervessel.trade.experiment import course_of
-from supervessel.trade.flight import HERE, fly_all
+from supervessel.trade.flight import HERE, fly_all, keep, read
 from support import ISS_DG, OK, Instance, variant
 
 COURSES = {
@@ -97,6 +97,22 @@ def test_every_model_of_a_scene_with_moving_parts_is_a_scene():
         for choice in reference_choices(scene, model):
             assert choice.propagator == "dop853"
             variant_of(scene, choice)
+
+
+@pytest.mark.parametrize("content", ["{}", "[]", "7", "null", '{"refused": null}', '{"kept": {}}', '{"sha'])
+def test_what_was_not_kept_whole_is_not_read(tmp_path, content):
+    place = tmp_path / "kept.json"
+    place.write_text(content)
+    assert read(place) is None
+
+
+def test_what_was_kept_is_read_to_the_last_bit_unless_it_is_changed(tmp_path):
+    place, found = tmp_path / "kept.json", {"refused": None, "samples": [0.1 + 0.2, 5e-324, float("inf")]}
+    assert read(place) is None
+    keep(place, found)
+    assert read(place) == found
+    place.write_text(place.read_text().replace("5e-324", "1e-323"))
+    assert read(place) is None
 
 
 def test_the_host_compiles_without_warnings(tmp_path):

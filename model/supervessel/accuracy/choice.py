@@ -8,7 +8,7 @@ from supervessel.accuracy.flights import LONG, AccuracyError
 from supervessel.accuracy.search import MARGIN, Progress, Search, Tried, begun
 from supervessel.scene import CHOSEN, Accuracy, Rotation, Scene
 from supervessel.trade.choices import BEST, Choice, reference_choices
-from supervessel.trade.flight import place_of, read, workshop, write_whole
+from supervessel.trade.flight import keep, place_of, read, workshop
 
 CLAIM = (
     "From the scene's start, in communication steps of that length, with inputs anywhere in their ranges and "
@@ -71,7 +71,7 @@ def choose(scene: Scene, progress: Progress = lambda _: None) -> tuple[Scene, di
     kept = read(place)
     if kept is None:
         kept = _chosen(whole, accuracy, progress)
-        write_whole(place, json.dumps(kept).encode())
+        keep(place, kept)
     rotation = opened | kept["choice"]
     if rotation["law"] == "none":  # keeps the rate always
         rotation = {
@@ -132,12 +132,7 @@ def _chosen(scene: Scene, accuracy: Accuracy, progress: Progress) -> dict[str, A
 
 def _settings(choice: Choice) -> dict[str, Any]:
     """Returns a choice as keys of [rotation]."""
-    found: dict[str, Any] = {"law": choice.model.law, "propagator": choice.propagator}
-    if choice.angle is not None:
-        found["max_angle_step"] = choice.angle
-    if choice.tolerance is not None:
-        found["tolerance"] = choice.tolerance
-    return found
+    return {"law": choice.model.law, "propagator": choice.propagator, **choice.settings}
 
 
 def _refusal(search: Search, accuracy: Accuracy) -> str:

@@ -1,6 +1,5 @@
 """Flights through histories of inputs, two processes at a time."""
 
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -8,6 +7,7 @@ from numpy.typing import NDArray
 
 from supervessel.accuracy.histories import Body, Histories
 from supervessel.equations import Equations
+from supervessel.processes import Workers
 from supervessel.scene import Scene
 from supervessel.trade.choices import Choice
 from supervessel.trade.experiment import TradeError
@@ -87,7 +87,7 @@ def fly(
         return run_host(built, shop.folder, job, names_of(scene), [courses[i] for i in part])
 
     samples, sub_steps = [], []
-    with ThreadPoolExecutor(AT_ONCE) as pool:
+    with Workers(AT_ONCE) as pool:
         for part, result in zip(parts, pool.map(flown, parts), strict=True):
             answers, raw = _ended(choice, result)
             if answers[-1]["refused"] is not None:

@@ -1,6 +1,5 @@
 """Flights of candidates through a scene's histories of inputs, and the cheapest that is exact enough."""
 
-import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from math import ceil, floor, log10
@@ -15,7 +14,7 @@ from supervessel.equations import Equations, equations
 from supervessel.propagators import plan_of
 from supervessel.scene import Accuracy, Law, Scene
 from supervessel.trade.choices import BEST, FINEST, LAWS_TRIED, Choice, Model, reference_choices, variant_of
-from supervessel.trade.flight import Workshop, build_all, place_of, read, source_of, write_whole
+from supervessel.trade.flight import Workshop, build_all, keep, place_of, read, source_of
 from supervessel.trade.study import HALF_ULP
 
 Array = NDArray[np.float64]
@@ -334,5 +333,5 @@ class Search:
             samples, sub_steps = flown
             attitude, rate = apart(samples, self.truth[part.start : part.stop])
             found = Errors(attitude.tolist(), rate.tolist(), sub_steps)
-        write_whole(place, json.dumps(asdict(found)).encode())
+        keep(place, asdict(found))
         return found

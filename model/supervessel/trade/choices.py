@@ -54,13 +54,13 @@ class Choice:
     tolerance: float | None = None
 
     @property
-    def setting(self) -> str:
-        """The angle or the tolerance as text, "" where there is none."""
-        value = self.angle if self.tolerance is None else self.tolerance
-        return "" if value is None else f"{value:g}"
+    def settings(self) -> dict[str, float]:
+        """The angle or the tolerance by its name in [rotation], nothing where there is neither."""
+        both = {"max_angle_step": self.angle, "tolerance": self.tolerance}
+        return {key: value for key, value in both.items() if value is not None}
 
     def __str__(self) -> str:
-        return " ".join(word for word in (f"{self.model},", self.propagator, self.setting) if word)
+        return " ".join([f"{self.model},", self.propagator, *(f"{x:g}" for x in self.settings.values())])
 
 
 def models(scene: Scene, *, quick: bool) -> list[Model]:

@@ -7,7 +7,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supervessel.equations import Equations, equations
+from supervessel.processes import Workers, run
 from supervessel.scene import Scene
 from supervessel.trade.choices import SHOWN, Choice, variant_of
 from supervessel.trade.experiment import Course, TradeError, course_of
@@ -129,8 +129,7 @@ def build_all(scene: Scene, choices: Sequence[Choice], shop: Workshop, done: Cal
     if not wanted:
         return
     _build_host(shop.folder)
-    pool = ThreadPoolExecutor(AT_ONCE)
-    try:
+    with Workers(AT_ONCE) as pool:
         begun = {}
         # CasADi's expressions are made in one thread: only compilers run beside it.
         for i, choice in enumerate(wanted):
@@ -142,8 +141,6 @@ def build_all(scene: Scene, choices: Sequence[Choice], shop: Workshop, done: Cal
         for choice, (model, description, compiling) in begun.items():
             shop.built[choice] = _built(model, description, compiling.result())
             done(f"build {choice}")
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 def source_of(choice: Choice) -> Choice:
@@ -304,7 +301,7 @@ def run_host(
         file.write_text(json.dumps(whole))
         command = [sys.executable, "-I", str(HERE / "host.py"), str(file)]
         try:
-            ended = subprocess.run(command, capture_output=True, text=True, timeout=TIME_LIMIT, check=False)
+            ended = run(command, TIME_LIMIT)
         except subprocess.TimeoutExpired:
             return None
         if ended.returncode != 0:
@@ -352,11 +349,21 @@ def _maker() -> list[str]:
 
 
 def read(place: Path) -> Any:
-    """Returns what is kept, None where nothing whole is."""
+    """Returns what `keep` has kept, None where nothing whole is."""
     try:
-        return json.loads(place.read_text())
-    except (OSError, ValueError):
+        whole = json.loads(place.read_text())
+        return whole["kept"] if whole["sha256"] == _digest(whole["kept"]) else None
+    except (OSError, ValueError, TypeError, KeyError):
         return None
+
+
+def keep(place: Path, found: Any) -> None:
+    """Keeps something, as JSON takes it, beside its own digest. Raises TradeError if it cannot be written."""
+    write_whole(place, json.dumps({"sha256": _digest(found), "kept": found}).encode())
+
+
+def _digest(found: Any) -> str:
+    return hashlib.sha256(json.dumps(found).encode()).hexdigest()
 
 
 def _read(place: Path) -> Flown | None:
@@ -365,8 +372,7 @@ def _read(place: Path) -> Flown | None:
 
 
 def _keep(place: Path, flown: Flown) -> None:
-    """Keeps a result; the file appears when it is whole."""
-    write_whole(place, json.dumps(asdict(flown) | {"samples": flown.samples.tolist()}).encode())
+    keep(place, asdict(flown) | {"samples": flown.samples.tolist()})
 
 
 def write_whole(file: Path, content: bytes) -> None:

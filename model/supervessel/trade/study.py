@@ -29,6 +29,39 @@ Progress = Callable[[int, int, str], None]
 """Told how many of how many parts are done, and the latest one."""
 
 
+ABOUT = {
+    "scene": "name of the scene",
+    "machine": "system and processor on which times were taken",
+    "versions": "of the packages that results depend on",
+    "experiment": "flown: duration [s], communication step [s], inputs as rows of time [s] and value",
+    "steps": "communication steps of the experiment",
+    "horizons": "times [s] up to which errors in lists are the largest; single errors are over the whole",
+    "doubt": "how far two ways to the best model's motion are apart: smaller errors are not told",
+    "models": "laws, and what each leaves out: its exact motion against the best model's, the last one",
+    "choices": "models with a propagator and its settings: errors and costs",
+    "refused": "choices that could not be flown",
+    "law": "[rotation] law",
+    "frozen": 'kind of inputs that keep their value at the start: "mass", "pose" or "", none',
+    "same": "models with the same motion to the last bit",
+    "attitude": "error [rad]: angle between the attitude and that of the law tensor with all inputs moving",
+    "rate": "error [rad/s]: length of the difference of the angular velocities, likewise",
+    "integration_attitude": "error [rad] against the exact motion of the same model",
+    "integration_rate": "error [rad/s] against the exact motion of the same model",
+    "propagator": "[rotation] propagator",
+    "setting": 'what its settings are: "max_angle_step" [rad], "tolerance" [1], "" where it has none',
+    "settings": "values of that; all of them move the same to the last bit",
+    "sub_steps": "sub-steps of the whole experiment",
+    "ns_per_step": "time [ns] of a communication step: inputs set, step, attitude and rate got",
+    "rk4_steps_per_step": "that over the time of a plain RK4 step, timed in turn",
+    "us_per_second": "time [us] that a second of motion takes",
+    "bytes": "size of the library",
+    "pareto": "whether no other choice is as good in both error of the attitude and cost, and better in one",
+    "choice": "model, propagator and setting",
+    "reason": "in the FMU's words",
+}
+"""What the keys of a trade are."""
+
+
 @dataclass(frozen=True)
 class Errors:
     """Largest errors up to each horizon, (3,): of the attitude [rad], of the angular velocity [rad/s]."""
@@ -46,13 +79,7 @@ class _Reference:
 
 
 def study(scene: Scene, *, quick: bool = False, progress: Progress = lambda *_: None) -> dict[str, Any]:
-    """Returns the trade of a scene, as trade.json lays it out.
-
-    Errors are the largest up to each of `horizons` [s] in lists, up to the end as single numbers: of the
-    attitude [rad] and of the rate [rad/s], against the law tensor with all inputs moving; `integration_...`
-    against the own law. doubt: how far two ways to the reference are apart. models: what each leaves out, and
-    those that move the `same`. choices: errors and costs, Pareto front marked; settings that move the same
-    are one. refused: what could not be flown, and why.
+    """Returns the trade of a scene, as trade.json lays it out: "about" says what each key is.
 
     scene    : with an experiment
     quick    : fewer laws, steps and tolerances
@@ -76,7 +103,7 @@ def study(scene: Scene, *, quick: bool = False, progress: Progress = lambda *_: 
         if result.refused is None
     ]
     rows = _merged(rows)
-    angles = [choice.setting for choice in by_angle(BEST, quick=quick)]
+    angles = [choice.angle for choice in by_angle(BEST, quick=quick)]
     for row in rows:
         if row["propagator"] == "rk4" and row["sub_steps"] == course.steps and angles[0] in row["settings"]:
             row["settings"] = angles  # the finest divides no step: no other was flown
@@ -84,6 +111,7 @@ def study(scene: Scene, *, quick: bool = False, progress: Progress = lambda *_: 
     rows.sort(key=lambda row: (order.index(label(row)), row["propagator"], row["sub_steps"]))
     _mark_front(rows, float(best.doubt.attitude[-1]))
     return {
+        "about": ABOUT,
         "scene": scene.name,
         "machine": f"{platform.system()} {platform.machine()}",
         "versions": {name: version(name) for name in ("supervessel", *BUILT_WITH)},
@@ -198,7 +226,8 @@ def _row(choice: Choice, flown: Flown, course: Course, own: Array, best: Array) 
         "law": choice.model.law,
         "frozen": choice.model.frozen,
         "propagator": choice.propagator,
-        "settings": [choice.setting] if choice.setting else [],
+        "setting": next(iter(choice.settings), ""),
+        "settings": list(choice.settings.values()),
         "attitude": float(total.attitude[-1]),
         "rate": float(total.rate[-1]),
         "integration_attitude": float(integration.attitude[-1]),
