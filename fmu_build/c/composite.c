@@ -98,6 +98,7 @@ static Status check_inputs(Instance *instance, double p[]) {
     const Dynamics *now = &instance->now;
     const bool judged_before = now->c[COMPOSITE_MASS] > 0.0;
     Status status = STATUS_OK;
+    if (INPUT_P_COUNT == 0) return status;
     for (const Judged *judged = JUDGED; judged->check != CHECK_NONE && status == STATUS_OK; judged++) {
         static const size_t together[] = {[CHECK_PMI] = 3, [CHECK_PORT] = 6};
         const size_t place = judged->reference - REFERENCE_P;

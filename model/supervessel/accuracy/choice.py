@@ -45,7 +45,7 @@ def choose(scene: Scene, progress: Progress = lambda _: None) -> tuple[Scene, di
 
     The cheapest candidate, by counted operations, whose flights through histories of inputs keep the
     accuracy with a margin: a dictionary says what was asked, flown and found. What has been found is kept
-    in the user's cache: the same again takes no time. `build_fmu` and `Twin` choose by themselves.
+    in the user's cache, and the same again is read from there. `build_fmu` and `Twin` choose by themselves.
 
     scene    : with `[accuracy]`
     progress : told what is being done
