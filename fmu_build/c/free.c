@@ -76,6 +76,12 @@ static bool has_tiny_rate(const Scaled *scaled) {
     return tiny;
 }
 
+static bool all_finite(const double values[], size_t count) {
+    bool finite = true;
+    for (size_t i = 0; i < count; i++) finite = finite && isfinite(values[i]);
+    return finite;
+}
+
 /* One piece of free motion, *time [s] or less: what is left of it is *time. */
 static Status free_piece(Instance *instance, double x[], double *time, bool whole) {
     Scaled scaled = scale(instance, x, *time);
@@ -90,7 +96,7 @@ static Status free_piece(Instance *instance, double x[], double *time, bool whol
         int doublings = 0;
         if (phase > FIRST_ANGLE) frexp(phase / FIRST_ANGLE, &doublings);
         follow(instance, &scaled, doublings, next);
-        for (size_t i = 0; i < STATE_COUNT; i++) finite = finite && isfinite(next[i]);
+        finite = all_finite(next, STATE_COUNT);
     }
     if (!finite)
         return instance_refuse(instance,
@@ -128,12 +134,6 @@ Status free_motion(Instance *instance, const double x[], double time, double nex
 
 /* By which rates may have to be divided for free_at: beyond, its constants would be no normal doubles. */
 enum { LARGEST_EXPONENT = 900 };
-
-static bool all_finite(const double values[], size_t count) {
-    bool finite = true;
-    for (size_t i = 0; i < count; i++) finite = finite && isfinite(values[i]);
-    return finite;
-}
 
 /* Makes now.from_epoch. Returns whether it serves. */
 static bool find_constants(Instance *instance) {
