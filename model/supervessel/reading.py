@@ -14,7 +14,7 @@ LONGEST_LINE = 100_000
 """Characters of a line."""
 DEEPEST = 16
 """Brackets and braces within each other in a TOML file."""
-MOST_PARTS = 16
+MOST_PARTS = 8
 """Parts of a key: vessels.DG.ports.nose has four."""
 
 HANDED_OVER = re.compile(r"/dev/stdin|(/dev|/proc/self)/fd/\d+")
@@ -65,6 +65,8 @@ def read_text(path: Path, most: int) -> str:
         raw = _read(path, most + 1)
     except OSError as error:
         raise ReadingError(f"cannot be read: {error.strerror}") from None
+    except ReadingError:
+        raise
     except ValueError:  # of a null in the name
         raise ReadingError("cannot be read: no file has such a name") from None
     if len(raw) > most:
