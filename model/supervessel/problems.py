@@ -124,6 +124,8 @@ def key_path(place: Iterable[Any]) -> str:
 
 def toml_key(name: str) -> str:
     """Returns a key as TOML has it: in quotes where it needs them."""
+    if name.isascii() and name.isidentifier() and len(name) <= LONGEST_WORD:  # as nearly all are
+        return name
     return printable(name if BARE.fullmatch(name) else json.dumps(name, ensure_ascii=False))
 
 

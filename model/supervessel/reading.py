@@ -28,9 +28,11 @@ STRING = (
 )
 """A string of TOML, or what begins as one."""
 COMMENT = r"#[^\n]*+"
-FLAT = r"[\[{][^\[\]{}\"'#\n]*+[\]}]"
-BRACKETS = re.compile(rf"{STRING}|{COMMENT}|{FLAT}|[\[\]{{}}]", re.DOTALL)
-"""What tells how deep brackets stand: those in strings and comments do not; a flat list is one match."""
+BRACKETS = re.compile(rf"{STRING}|{COMMENT}|([\[\]{{}}])", re.DOTALL)
+"""What tells how deep brackets stand: those in strings and comments do not."""
+NOTHING = bytes(set(range(256)) - set(b"[]{}\"'#\n=,."))
+"""What brackets, strings and comments do without, and what stands between two strings."""
+SQUARE = str.maketrans("{}", "[]")
 PARTS = re.compile(
     rf"(?P<part>{STRING}|[^\s\"'#.,=\[\]{{}}]++)|(?P<dot>\.)|{COMMENT}|[,=\[\]{{}}\n]", re.DOTALL
 )
@@ -103,16 +105,23 @@ def _check_kind(path: Path, mode: int) -> None:
 
 def _check_depth(text: str) -> None:
     """Raises ReadingError where brackets stand too deep within each other for the parser, which recurses."""
+    some = text
+    if not any(mark in text for mark in ("\\", '"""', "'''")):  # strings keep their ends without the rest
+        some = text.encode().translate(None, NOTHING).decode()
+    brackets = "".join(BRACKETS.findall(some)).translate(SQUARE)
+    for _ in range(DEEPEST):  # each time the innermost ones go
+        brackets = brackets.replace("[]", "")
+    if not brackets:
+        return
     depth = deepest = place = 0
     for match in BRACKETS.finditer(text):
-        token = match.group()
-        if token[0] in "[{":
-            if depth >= deepest:
-                place = match.start() if deepest <= DEEPEST else place
-                deepest = depth + 1
-            depth += len(token) == 1  # else a list that is closed in the same match
-        elif token in "]}":
-            depth = max(depth - 1, 0)
+        bracket = match[1]
+        if bracket is None:
+            continue
+        depth = depth + 1 if bracket in "[{" else max(depth - 1, 0)
+        if depth > deepest:
+            place = match.start() if deepest <= DEEPEST else place
+            deepest = depth
     if deepest > DEEPEST:
         raise ReadingError(f"brackets {deepest} deep; at most {DEEPEST} are possible", _line(text, place))
 

@@ -79,7 +79,9 @@ PLACES = {
     "root": lambda word: {"root": word},
     "law": lambda word: {"rotation.law": word},
     "dock": lambda word: {"docks": [{"ports": [word, f"{word}.{word}"], "name": word}] * 3},
-    "inputs": lambda word: {"inputs": {key: [word, word] for key in ("mass", "pmi", "docked", "force", word)}},
+    "inputs": lambda word: {
+        "inputs": {key: [word, word] for key in ("mass", "pmi", "docked", "force", word)}
+    },
     "pose": lambda word: {"inputs.pose": [f"DG.{word}", f"{word}.nose"], "inputs.motion": ["DG.nose", word]},
     "range": lambda word: {"inputs.range": {word: [0, 1], f"{word}.mass": [2, 1], f"{word}.": {word: 1}}},
     "course": lambda word: {
@@ -162,7 +164,9 @@ def assert_scene(text: str) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs file names of any bytes")
-@pytest.mark.parametrize("stem", ['a"""\n[x]\ny = 1\n#', "\x1b[31m", "\u202egnp", "a\udcff", "'''", "w" * 200])
+@pytest.mark.parametrize(
+    "stem", ['a"""\n[x]\ny = 1\n#', "\x1b[31m", "\u202egnp", "a\udcff", "'''", "w" * 200]
+)
 def test_the_name_of_a_scenario_cannot_break_the_scene_made_of_it(tmp_path, stem):
     files = Files(tmp_path)
     files.scenario = files.scenario.rename(tmp_path / f"{stem}.scn")
