@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: run test check platforms robustness stability accuracy bench slews peers clean
+.PHONY: run test check platforms robustness stability accuracy surroundings bench slews peers clean
 
 run: .venv/installed
 	$(BIN)/python -m fmu_build examples/iss_dg.toml -o build/iss_dg.fmu
@@ -28,6 +28,9 @@ stability: .venv/installed-dev
 
 accuracy: .venv/installed-dev
 	$(BIN)/python -m pytest -m accuracy tests/accuracy
+
+surroundings: .venv/installed-dev
+	$(BIN)/python -m pytest -m surroundings tests/surroundings
 
 bench: .venv/installed-dev
 	$(BIN)/python tests/bench/run.py

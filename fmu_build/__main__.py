@@ -11,14 +11,15 @@ from fmu_build.errors import BuildError
 from fmu_build.platforms import PLATFORMS, Platform, platforms_named
 from supervessel import Scene, SceneError, choose, load_scene
 from supervessel.accuracy import said
-from supervessel.console import print_results, show_progress
+from supervessel.console import Parser, print_results, show_progress
 from supervessel.interrupts import interrupted_once
+from supervessel.problems import printable
 from supervessel.trade import TradeError
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Builds the FMU of a scene file; returns 0 when done, 1 when it failed, each problem on stderr."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="python -m fmu_build",
         description="Build the FMU of a scene: its path on stdout, before it in "
         "a line what [accuracy] has chosen.",
@@ -52,14 +53,16 @@ def _build(options: argparse.Namespace, platforms: Sequence[Platform]) -> int:
         scene = load_scene(options.scene)
         output = options.output or Path(f"{scene.name}.fmu")
         if output.resolve() == options.scene.resolve():
-            raise BuildError(f"{output}: is the scene file itself; the FMU needs a name of its own")
+            raise BuildError(
+                f"{printable(str(output))}: is the scene file itself; the FMU needs a name of its own"
+            )
         chosen = _choose(scene) if scene.accuracy else []
         build_fmu(scene, output, options.fmi, platforms)
     except (SceneError, BuildError) as error:
         print(error, file=sys.stderr)
         return 1
     except TradeError as error:
-        print(f"{options.scene.name}: {error}", file=sys.stderr)
+        print(f"{printable(options.scene.name)}: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print("interrupted; no FMU was written", file=sys.stderr)

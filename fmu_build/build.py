@@ -21,6 +21,7 @@ from fmu_build.table import Entry, variable_table
 from fmu_build.terminals import terminals_and_icons
 from supervessel.accuracy import choose
 from supervessel.equations import Equations, equations
+from supervessel.problems import printable
 from supervessel.processes import Workers
 from supervessel.scene import Scene
 from supervessel.trade import TradeError
@@ -184,14 +185,15 @@ def _check_output(output: Path) -> None:
     """Raises BuildError, before any work is done, where the archive could not be written."""
     try:
         if output.is_dir():
-            raise BuildError(f"{output}: is a folder; the FMU needs a file name")
+            raise BuildError(f"{printable(str(output))}: is a folder; the FMU needs a file name")
     except OSError as error:
-        raise BuildError(f"{output}: cannot be written: {error.strerror}") from None
+        raise BuildError(f"{printable(str(output))}: cannot be written: {error.strerror}") from None
     try:
         with tempfile.TemporaryFile(dir=output.parent):
             pass
     except OSError as error:
-        raise BuildError(f"{output}: cannot be written: {error.strerror}: {output.parent}") from None
+        shown, parent = printable(str(output)), printable(str(output.parent))
+        raise BuildError(f"{shown}: cannot be written: {error.strerror}: {parent}") from None
 
 
 def _write_archive(content: Mapping[str, bytes], output: Path) -> None:
@@ -211,4 +213,4 @@ def _write_archive(content: Mapping[str, bytes], output: Path) -> None:
     except OSError as error:
         if part is not None:
             part.unlink(missing_ok=True)
-        raise BuildError(f"{output}: cannot be written: {error.strerror}") from None
+        raise BuildError(f"{printable(str(output))}: cannot be written: {error.strerror}") from None

@@ -14,18 +14,18 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import get_args
 
-from supervessel.console import print_results, show_progress
+from supervessel.console import Parser, print_results, show_progress
 from supervessel.interrupts import interrupted_once
 from supervessel.loading import load_scene, parse_scene
 from supervessel.orbiter import ScenarioError, import_scenario
-from supervessel.problems import SceneError
+from supervessel.problems import SceneError, first, printable
 from supervessel.scene import Convention, Scene, without_accuracy
 from supervessel.trade import TradeError, course_of, plot, study, table, write_all
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs a subcommand; returns 0 when done, 1 when it failed, each problem on stderr."""
-    parser = argparse.ArgumentParser(prog="supervessel", description="Rotation of docked spacecraft.")
+    parser = Parser(prog="supervessel", description="Rotation of docked spacecraft.")
     parser.add_argument("--version", action="version", version=version("supervessel"))
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     _add_import(commands.add_parser("import", help="make a scene file from Orbiter's files"))
@@ -81,14 +81,17 @@ def _import(options: argparse.Namespace) -> int:
         print(error, file=sys.stderr)
         return 1
     if output.resolve() in [path.resolve() for path in made.sources]:
-        print(f"{output}: is one of the files read; the scene needs a file of its own", file=sys.stderr)
+        print(
+            f"{printable(str(output))}: is one of the files read; the scene needs a file of its own",
+            file=sys.stderr,
+        )
         return 1
-    for note in made.notes:
+    for note in first(made.notes, "notes, all of them at the head of the scene"):
         print(f"note: {note}", file=sys.stderr)
     try:
         _write(made.text, output)
     except OSError as error:
-        print(f"{output}: cannot be written: {error.strerror}", file=sys.stderr)
+        print(f"{printable(str(output))}: cannot be written: {error.strerror}", file=sys.stderr)
         return 1
     return print_results(str(output), "the scene is written, its path")
 
@@ -133,7 +136,7 @@ def _trade(options: argparse.Namespace) -> int:
         print(error, file=sys.stderr)
         return 1
     except TradeError as error:
-        print(f"{options.scene.name}: {error}", file=sys.stderr)
+        print(f"{printable(options.scene.name)}: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print(

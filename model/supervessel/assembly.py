@@ -10,8 +10,13 @@ MOST_WAYS = 64
 """Ways of docking by which a vessel may hang on the root: each has a pose of its own in the equations."""
 
 
+MOST_WAYS_IN_ALL = 2000
+MOST_PASSED = 50_000
+"""Ways of all vessels together, and docks with an input on them: a pose each, a factor each."""
+
+
 class TooManyWaysError(ValueError):
-    """A vessel may hang on the root in more than MOST_WAYS ways."""
+    """A vessel may hang on the root in more than MOST_WAYS ways, or all of them in too many."""
 
 
 @dataclass(frozen=True)
@@ -107,9 +112,16 @@ def ways(scene: Scene, parts: Sequence[Group]) -> list[list[Way]]:
     neighbours = _neighbours(scene, scene.docks)
     found: list[list[Way]] = [[] for _ in parts]
     waiting = deque([Way(0)])
+    count = passed = 0
     while waiting:
         way = waiting.popleft()
         found[way.group].append(way)
+        count, passed = count + 1, passed + len(way.docks)
+        if count > MOST_WAYS_IN_ALL or passed > MOST_PASSED:
+            raise TooManyWaysError(
+                f"docks: the vessels may hang on the root in more than {MOST_WAYS_IN_ALL} ways in all, or in "
+                f"ways over more than {MOST_PASSED} docks; at most that many are possible"
+            )
         if len(found[way.group]) > MOST_WAYS:
             raise TooManyWaysError(
                 f"docks: {parts[way.group].reference} may hang on the root in more than {MOST_WAYS} ways; "

@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from supervessel.problems import quantity
+from supervessel.problems import listed, printable, quantity, toml_key
 from supervessel.quantities import Vector, is_number, triangle_problem, vector_length
 from supervessel.scene import (
     CHOSEN,
@@ -28,10 +28,11 @@ def consistency_problems(raw: Mapping[str, Any]) -> list[str]:
     problems: list[str] = []
     rigid = raw.get("convention") != "orbiter"
     for name, vessel in tables(raw, "vessels"):
-        problems += _moments(f"vessels.{name}", vessel)
-        problems += _rigid_moments(f"vessels.{name}", vessel) if rigid else _no_tensor(name, vessel)
+        place = f"vessels.{toml_key(name)}"
+        problems += _moments(place, vessel)
+        problems += _rigid_moments(place, vessel) if rigid else _no_tensor(place, vessel)
         for port, table in tables(vessel, "ports"):
-            problems += direction_problems(f"vessels.{name}.ports.{port}", table)
+            problems += direction_problems(f"{place}.ports.{toml_key(port)}", table)
     problems += [*_experiment(raw), *_accuracy(raw), *_ranges(raw), *_total_mass(raw)]
     return [*problems, *_propagator(raw), *_changes(raw)]
 
@@ -55,9 +56,9 @@ def _rigid_moments(place: str, vessel: Mapping[str, Any]) -> Iterator[str]:
         yield f"{place}.pmi = {quantity((x, y, z), 'm2')}: {problem}"
 
 
-def _no_tensor(name: str, vessel: Mapping[str, Any]) -> Iterator[str]:
+def _no_tensor(place: str, vessel: Mapping[str, Any]) -> Iterator[str]:
     if "inertia" in vessel:
-        yield f'vessels.{name}.inertia: convention = "orbiter" knows no products of inertia; give pmi [m2]'
+        yield f'{place}.inertia: convention = "orbiter" knows no products of inertia; give pmi [m2]'
 
 
 def direction_problems(place: str, port: Mapping[str, Any]) -> Iterator[str]:
@@ -120,7 +121,7 @@ def _accuracy(raw: Mapping[str, Any]) -> Iterator[str]:
             yield f"accuracy.rate = {rate} rad/s: must be at least {least}"
     without = list(_without_range(inputs)) if isinstance(inputs, Mapping) else []
     if without:
-        names = ", ".join(f'"{name}"' for name in without)
+        names = listed((f'"{name}"' for name in without), len(without))
         yield f"inputs.range: missing for {names}: [accuracy] needs one for every input that is a number"
 
 
@@ -144,7 +145,7 @@ def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:
             continue
         low, high = map(float, bounds)
         kind = name.rpartition(".")[2].partition("[")[0]
-        path = f'inputs.range."{name}" = {quantity((low, high), VARIABLE_UNITS.get(kind, ""))}'
+        path = f'inputs.range."{printable(name)}" = {quantity((low, high), VARIABLE_UNITS.get(kind, ""))}'
         if low > high:
             yield f"{path}: low must not exceed high"
         elif kind == "mass" and low < 0.0:

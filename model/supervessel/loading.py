@@ -1,7 +1,5 @@
 """Reading scene files: every problem of a scene is found and named before anything is built from it."""
 
-import re
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,10 +10,11 @@ from pydantic import ValidationError
 from supervessel.assembly import TooManyWaysError
 from supervessel.consistency import consistency_problems
 from supervessel.equations import composite_at_start
-from supervessel.naming import misnamed_courses, naming_problems
-from supervessel.problems import SceneError, quantity, unknown
+from supervessel.naming import misnamed_courses, naming_problems, size_problems
+from supervessel.problems import SceneError, few_suggestions, key_path, quantity, unknown
+from supervessel.reading import ReadingError, read_toml
 from supervessel.scene import Scene, known_keys
-from supervessel.variables import input_variables
+from supervessel.variables import InputVariable, input_variables
 
 EXPECTED = {
     "dict_type": "a table",
@@ -39,16 +38,14 @@ def load_scene(path: str | Path) -> Scene:
     """
     path = Path(path)
     try:
-        raw = tomllib.loads(path.read_bytes().decode("utf-8"))
-    except OSError as error:
-        raise SceneError(str(path), [f"cannot be read: {error.strerror}"]) from None
-    except UnicodeDecodeError as error:
-        raise SceneError(str(path), [f"is not UTF-8 text (byte {error.start})"]) from None
-    except (ValueError, RecursionError) as error:  # of integers too long, of arrays too deep
-        raise SceneError(str(path), [f"is not TOML: {error}"]) from None
+        raw = read_toml(path)
+    except ReadingError as error:
+        place = f"line {error.line}: " if error.line else ""
+        raise SceneError(str(path), [f"{place}{error}"]) from None
     return parse_scene(raw, path.name)
 
 
+@few_suggestions()
 def parse_scene(raw: Mapping[str, Any], source: str = "scene") -> Scene:
     """Returns the scene that nested dictionaries describe, laid out as a scene file is.
 
@@ -62,14 +59,19 @@ def parse_scene(raw: Mapping[str, Any], source: str = "scene") -> Scene:
         >>> parse_scene({"name": "ball", "root": "B", "vessels": {"B": ball}}).rotation.law
         'tensor'
     """
-    problems: list[str] = []
+    problems = list(size_problems(raw))
+    if problems:
+        raise SceneError(source, problems)
     scene = None
     try:
         scene = Scene.model_validate(raw)
     except ValidationError as error:
         misnamed = {("experiment", "inputs", name) for name in misnamed_courses(raw)}
         problems += [
-            text for one in error.errors() if one["loc"][:3] not in misnamed for text in _explain(one)
+            text
+            for one in error.errors(include_url=False)
+            if one["loc"][:3] not in misnamed
+            for text in _explain(one)
         ]
     problems += naming_problems(raw) + consistency_problems(raw)
     if scene is None or problems:
@@ -78,17 +80,6 @@ def parse_scene(raw: Mapping[str, Any], source: str = "scene") -> Scene:
     if problems:
         raise SceneError(source, problems)
     return scene
-
-
-def key_path(place: tuple[Any, ...]) -> str:
-    """Returns a place in a scene file as its author would write it: vessels.DG.ports.nose, docks[1]."""
-    path = ""
-    for part in place:
-        if isinstance(part, int):
-            path += f"[{part + 1}]"
-        else:
-            path += ("." if path else "") + (part if re.fullmatch(r"[\w-]+", part) else f'"{part}"')
-    return path
 
 
 def _explain(error: Any) -> list[str]:
@@ -109,10 +100,13 @@ def _explain(error: Any) -> list[str]:
 def _range_problems(scene: Scene) -> list[str]:
     """Returns which start values lie outside inputs.range."""
     problems = []
-    variables = input_variables(scene)
+    groups: dict[str, list[InputVariable]] = {}
+    for variable in input_variables(scene):
+        for name in {variable.name, variable.group}:
+            groups.setdefault(name, []).append(variable)
     for name, (low, high) in scene.inputs.range.items():
-        for variable in variables:
-            if name in (variable.name, variable.group) and not low <= variable.start <= high:
+        for variable in groups.get(name, ()):
+            if not low <= variable.start <= high:
                 start = quantity(variable.start, variable.unit)
                 path = f'inputs.range."{name}" = {quantity((low, high), variable.unit)}'
                 problems.append(f"{path}: the start value {variable.name} = {start} lies outside")

@@ -5,14 +5,28 @@ Works on the raw tables of a file, so that a wrong name is reported beside a wro
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any
 
-from supervessel.problems import quantity, unknown
+from supervessel.problems import listed, printable, quantity, toml_key, unknown
 from supervessel.scene import OUTPUT_NAMES, VESSEL_OUTPUT_NAMES, input_groups
 
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 MODEL_NAME = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*_?")
+LONGEST_NAME = 100
+"""Letters of a name: what file systems, linkers and archives take, with room for what stands around it."""
+DEVICE = re.compile(r"(con|prn|aux|nul|(com|lpt)[0-9])", re.IGNORECASE)
+"""Names that Windows keeps for devices, with any extension: no file can have one."""
+
+MOST_VESSELS = 2000
+MOST_MOVING = 1000
+MOST_LISTED = 2000
+"""Vessels, inputs that move or close docks, and names in another list of inputs that a scene may have: what
+is read in seconds."""
+
+Ports = Mapping[str, Collection[str]]
+"""Names of the ports, or points, of each vessel."""
+
 RESERVED = frozenset(
     (
         *OUTPUT_NAMES,
@@ -32,6 +46,19 @@ RESERVED = frozenset(
     )
 )
 """Names of the FMU's own variables, and those it will have: no vessel or port can take them."""
+
+
+def size_problems(raw: Mapping[str, Any]) -> Iterator[str]:
+    """Yields why a scene is too large to be looked at any further."""
+    inputs = _table(raw, "inputs")
+    lists = {f"inputs.{key}": len(_list(inputs, key)) for key in inputs}
+    moving = "inputs.pose and inputs.docked"
+    counts = {"vessels": len(_table(raw, "vessels")), **lists}
+    counts[moving] = lists.get("inputs.pose", 0) + lists.get("inputs.docked", 0)
+    for place, count in counts.items():
+        most = {"vessels": MOST_VESSELS, moving: MOST_MOVING}.get(place, MOST_LISTED)
+        if count > most:
+            yield f"{printable(place)}: {count} of them; at most {most} are possible"
 
 
 def naming_problems(raw: Mapping[str, Any]) -> list[str]:
@@ -59,16 +86,21 @@ def _list(raw: Any, key: str) -> list[Any]:
     return list(value) if isinstance(value, list | tuple) else []
 
 
+def _named(raw: Any, key: str) -> dict[str, None]:
+    """Returns the names in a list, each once, in their order."""
+    return dict.fromkeys(name for name in _list(raw, key) if isinstance(name, str))
+
+
 def _repeated(names: Iterable[str]) -> Iterator[str]:
     """Yields which names stand in a list more than once."""
     for name, count in sorted(Counter(names).items()):
         if count > 1:
-            yield f"{name} is listed {count} times"
+            yield f"{printable(name)} is listed {count} times"
 
 
-def _parts(raw: Mapping[str, Any], key: str) -> dict[str, list[str]]:
+def _parts(raw: Mapping[str, Any], key: str) -> Ports:
     """Returns the names of the "ports" or "points" of each vessel."""
-    return {vessel: list(_table(table, key)) for vessel, table in _table(raw, "vessels").items()}
+    return {vessel: _table(table, key).keys() for vessel, table in _table(raw, "vessels").items()}
 
 
 def _dock_names(raw: Mapping[str, Any]) -> dict[int, str]:
@@ -80,36 +112,56 @@ def _dock_names(raw: Mapping[str, Any]) -> dict[int, str]:
 
 def _model_name(raw: Mapping[str, Any]) -> Iterator[str]:
     name = raw.get("name")
-    if isinstance(name, str) and not MODEL_NAME.fullmatch(name):
+    if not isinstance(name, str):
+        return
+    if len(name) > LONGEST_NAME:
+        yield f"name = {quantity(name)}: {_too_long(name)}"
+    elif not MODEL_NAME.fullmatch(name):
         yield f"name = {quantity(name)}: must be a letter, then letters, digits and single underscores"
+    elif DEVICE.fullmatch(name):
+        yield f"name = {quantity(name)}: must be another: files have it, and Windows keeps it for a device"
 
 
-def _identifiers(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[str]:
+def _too_long(name: str) -> str:
+    return f"has {len(name)} characters; a name has at most {LONGEST_NAME}"
+
+
+def _identifiers(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
     if not ports and isinstance(raw.get("vessels"), Mapping):
         yield "vessels: at least one vessel is needed"
     points = _parts(raw, "points")
     places = [("vessels", vessel) for vessel in ports]
     for key, owners in (("ports", ports), ("points", points)):
-        places += [(f"vessels.{vessel}.{key}", part) for vessel, names in owners.items() for part in names]
+        places += [
+            (f"vessels.{toml_key(vessel)}.{key}", part) for vessel, names in owners.items() for part in names
+        ]
     places += [(f"docks[{i}].name", name) for i, name in _dock_names(raw).items()]
     for place, name in places:
-        if not IDENTIFIER.fullmatch(name):
+        if len(name) > LONGEST_NAME:
+            yield f"{place}: name {quantity(name)} {_too_long(name)}"
+        elif not IDENTIFIER.fullmatch(name):
             rule = "must be a letter or underscore, then letters, digits, underscores"
             yield f"{place}: name {quantity(name)} {rule}"
         elif name in RESERVED:
             yield f'{place}: name "{name}" is reserved for a variable of the FMU'
     for vessel, names in points.items():
         for name in sorted(set(names).intersection(ports[vessel])):
-            yield f'vessels.{vessel}.points: name "{name}" is that of a port of {vessel}'
+            here = printable(vessel)
+            yield f'vessels.{here}.points: name "{printable(name)}" is that of a port of {here}'
     first: dict[str, int] = {}
     for i, name in _dock_names(raw).items():
         if name in ports:
-            yield f'docks[{i}].name: name "{name}" is that of a vessel'
+            yield f'docks[{i}].name: name "{printable(name)}" is that of a vessel'
         elif first.setdefault(name, i) != i:
-            yield f'docks[{i}].name: name "{name}" is that of docks[{first[name]}]'
+            yield f'docks[{i}].name: name "{printable(name)}" is that of docks[{first[name]}]'
 
 
-def _port_problem(name: object, ports: Mapping[str, list[str]], kind: str = "port") -> str:
+def _is_port(name: str, ports: Ports) -> bool:
+    vessel, _, port = name.partition(".")
+    return port in ports.get(vessel, ())
+
+
+def _port_problem(name: object, ports: Ports, kind: str = "port") -> str:
     """Returns why `name` is no port (or point) of the scene, or "" if it is one."""
     if not isinstance(name, str) or name.count(".") != 1:
         return f'{quantity(name)} must be a {kind}, written "vessel.{kind}"'
@@ -121,10 +173,10 @@ def _port_problem(name: object, ports: Mapping[str, list[str]], kind: str = "por
     return ""
 
 
-def _docks(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[str]:
+def _docks(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
     """Yields what keeps the docks closed at the start from making a forest, and all of them from reaching
     every vessel from the root."""
-    switched = _list(_table(raw, "inputs"), "docked")
+    switched = _named(_table(raw, "inputs"), "docked")
     closed, reached = ({vessel: {vessel} for vessel in ports} for _ in range(2))
     taken: dict[str, str] = {}
     always: dict[str, str] = {}
@@ -145,7 +197,7 @@ def _docks(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[s
         yield from (f"{place}: {problem}" for problem in problems)
         occupied = always if open_at_start and switchable else taken
         yield from (
-            f"{place}: port {name} is docked already, in {occupied[name]}"
+            f"{place}: port {printable(name)} is docked already, in {occupied[name]}"
             for name in names
             if name in occupied
         )
@@ -153,11 +205,11 @@ def _docks(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[s
         if not all(vessel in ports for vessel in vessels):
             complete = False
         elif vessels[0] == vessels[1]:
-            yield f"{place}: both ports belong to {vessels[0]}; a dock joins two vessels"
+            yield f"{place}: both ports belong to {printable(vessels[0])}; a dock joins two vessels"
         else:
             if not open_at_start and closed[vessels[0]] is closed[vessels[1]]:
-                joined = " and ".join(vessels)
-                yield f"{place}: {names[0]} - {names[1]} closes a loop; {joined} are joined already"
+                loop, joined = " - ".join(map(printable, names)), " and ".join(map(printable, vessels))
+                yield f"{place}: {loop} closes a loop; {joined} are joined already"
             for component in (reached,) if open_at_start else (closed, reached):
                 small, large = sorted((component[vessel] for vessel in vessels), key=len)
                 large |= small
@@ -169,9 +221,7 @@ def _docks(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[s
     yield from _root(raw, reached if complete else {}, ports)
 
 
-def _root(
-    raw: Mapping[str, Any], component: Mapping[str, set[str]], ports: Mapping[str, list[str]]
-) -> Iterator[str]:
+def _root(raw: Mapping[str, Any], component: Mapping[str, set[str]], ports: Ports) -> Iterator[str]:
     root = raw.get("root")
     if not isinstance(root, str):
         return
@@ -180,29 +230,29 @@ def _root(
         return
     for vessel, part in component.items():
         if part is not component[root]:
-            yield f"vessels.{vessel}: is not reached from the root {root} by docks"
+            yield f"vessels.{toml_key(vessel)}: is not reached from the root {printable(root)} by docks"
 
 
-def _inputs(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[str]:
+def _inputs(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
     inputs, points = _table(raw, "inputs"), _parts(raw, "points")
-    docked = {name for dock in _list(raw, "docks") for name in _list(dock, "ports") if isinstance(name, str)}
-    all_resolved = not any(_port_problem(name, ports) for name in docked)
-    posed = _list(inputs, "pose")
-    docks = list(_dock_names(raw).values())
+    docked = {name for dock in _list(raw, "docks") for name in _named(dock, "ports")}
+    all_resolved = all(_is_port(name, ports) for name in docked)
+    posed = _named(inputs, "pose")
+    docks = dict.fromkeys(_dock_names(raw).values())
 
     def pose_problem(key: str, name: str) -> str | None:
         problem = _port_problem(name, ports)
         if not problem and key == "motion" and name not in posed:
-            return f"{name} is not listed in inputs.pose; only a pose that is an input moves"
+            return f"{printable(name)} is not listed in inputs.pose; only a pose that is an input moves"
         if not problem and name not in docked and all_resolved:
-            return f"{name} is not docked; its pose would change nothing"
+            return f"{printable(name)} is not docked; its pose would change nothing"
         return problem
 
     def vessel_problem(key: str, name: str) -> str | None:
         if name not in ports:
             return unknown("vessel", name, ports)
         if key == "pmi" and "inertia" in _table(_table(raw, "vessels"), name):
-            return f"{name} is given by inertia; only a vessel given by pmi has this input"
+            return f"{printable(name)} is given by inertia; only a vessel given by pmi has this input"
         return None
 
     def problem_of(key: str, name: str) -> str | None:
@@ -234,39 +284,46 @@ def _groups(raw: Mapping[str, Any]) -> dict[str, int]:
 def misnamed_courses(raw: Mapping[str, Any]) -> dict[str, str]:
     """Returns what is wrong with names in experiment.inputs, by name; what stands there is not looked at."""
     groups = _groups(raw)
-    elements = {
-        name: [f"{name}[{i}]" for i in range(1, size + 1)] if size else [name]
-        for name, size in groups.items()
-    }
-    known = [name for names in elements.values() for name in names]
+    known = dict.fromkeys(one for name, size in groups.items() for one in _scalars(name, size))
     problems = {}
     for name, rows in _table(_table(raw, "experiment"), "inputs").items():
         if groups.get(name):
-            quoted = ", ".join(f'"{one}"' for one in elements[name])
+            quoted = ", ".join(f'"{one}"' for one in _scalars(name, groups[name]))
             rule = "the elements of a vector are given one by one"
-            problems[name] = f'experiment.inputs."{name}": {rule}: {quoted}'
+            problems[name] = f'experiment.inputs."{printable(name)}": {rule}: {quoted}'
         elif isinstance(rows, Mapping):
-            quoted = ", ".join(f'"{name}.{key}"' for key in rows)
             rule = "the name of an input stands in quotes here"
-            problems[name] = f"experiment.inputs.{name}: {rule}: {quoted} = [[time, value]]"
+            quoted = _quoted(name, rows)
+            problems[name] = f"experiment.inputs.{printable(name)}: {rule}: {quoted} = [[time, value]]"
         elif name not in known:
             problems[name] = f"experiment.inputs: {unknown('input', name, known)}"
     return problems
 
 
+def _scalars(name: str, size: int) -> list[str]:
+    """Returns the elements of an input by their names; a size of 0 is that of a scalar."""
+    return [f"{name}[{i}]" for i in range(1, size + 1)] or [name]
+
+
+def _quoted(name: str, table: Mapping[str, Any]) -> str:
+    """Returns the keys of a table as the names that they were meant to be part of."""
+    return listed((f'"{name}.{key}"' for key in table), len(table))
+
+
 def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:
     inputs = _table(raw, "inputs")
     groups = {name: size for name, size in _groups(raw).items() if not name.endswith(".docked")}
-    known = list(groups) + [f"{name}[{i}]" for name, size in groups.items() for i in range(1, size + 1)]
+    known = dict.fromkeys(groups)
+    known |= dict.fromkeys(one for name, size in groups.items() for one in _scalars(name, size))
     for name, bounds in _table(inputs, "range").items():
         if isinstance(bounds, Mapping):
-            quoted = ", ".join(f'"{name}.{key}"' for key in bounds)
-            yield f"inputs.range.{name}: the name of an input stands in quotes here: {quoted} = [low, high]"
+            rule = "the name of an input stands in quotes here"
+            yield f"inputs.range.{printable(name)}: {rule}: {_quoted(name, bounds)} = [low, high]"
         elif name not in known:
             yield f"inputs.range: {unknown('input', name, known)}"
 
 
-def _outputs(raw: Mapping[str, Any], ports: Mapping[str, list[str]]) -> Iterator[str]:
+def _outputs(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
     names = [name for name in _list(_table(raw, "outputs"), "names") if isinstance(name, str)]
     yield from (f"outputs.names: {problem}" for problem in _repeated(names))
     for name in dict.fromkeys(names):

@@ -780,7 +780,7 @@ def test_a_folder_in_the_place_of_a_file_is_named(tmp_path):
 
 def test_a_file_that_is_not_utf8_is_named_with_the_byte(tmp_path):
     path = tmp_path / "ball.toml"
-    assert refusal(path, b"# M\xfcller\n") == f"{path}: is not UTF-8 text (byte 3)"
+    assert refusal(path, b"# M\xfcller\n") == f"{path}: line 1: is not UTF-8 text (byte 0xfc)"
 
 
 @parametrised("value", ["9" * 5000, "[" * 5000 + "]" * 5000], ids=["5000 digits", "arrays 5000 deep"])

@@ -1,15 +1,15 @@
 """Vessel classes: Orbiter's .cfg files, and tables of the vessels that exist only in its code."""
 
 import re
-import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from supervessel.orbiter.text import Place, ScenarioError, numbers, read_lines, read_text
-from supervessel.problems import quantity, unknown
+from supervessel.orbiter.text import Place, ScenarioError, numbers, read_lines, unread
+from supervessel.problems import listed, printable, quantity, unknown
 from supervessel.quantities import is_number
+from supervessel.reading import ReadingError, read_toml
 
 TABLE_KEYS = (
     "empty_mass",
@@ -22,6 +22,10 @@ TABLE_KEYS = (
     "gravity_gradient_damping",
 )
 """Keys of a class in a table; the last three are not used."""
+
+MOST_PORTS = 100
+MOST_TANKS = 100
+"""Docking ports and tanks that a class may have: every ship of the class has each of them."""
 
 LONG_AGO = ("DockRef", "DockDir", "DockRot")
 """Keys of the one docking port of old .cfg files; it comes before those of the list."""
@@ -60,33 +64,45 @@ class VesselClass:
 
 @dataclass(frozen=True)
 class Library:
-    """Where classes are looked for: a table, which goes first, and .cfg files by the folder above them."""
+    """Where classes are looked for, by their names in small letters: a table, which goes first, and files.
+
+    table : name -> key and table of each class of that name
+    files : folder -> last part of a name -> the parts of the whole name and the .cfg file
+    """
 
     table_path: Path | None
-    table: Mapping[str, Any]
-    files: Mapping[Path, Sequence[Path]]
+    table: Mapping[str, Sequence[tuple[str, Any]]]
+    files: Mapping[Path, Mapping[str, Sequence[tuple[tuple[str, ...], Path]]]]
 
 
 def read_library(folders: Sequence[Path], table: Path | None) -> Library:
     """Returns what folders and a table offer. Raises ScenarioError where one of them cannot be read."""
     problems: list[str] = []
-    classes: dict[str, Any] = {}
+    classes: dict[str, list[tuple[str, Any]]] = {}
     if table is not None:
         try:
-            classes = tomllib.loads(read_text(table))
-        except ScenarioError as error:
-            problems += error.problems
-        except (ValueError, RecursionError) as error:  # of integers too long, of arrays too deep
-            problems.append(f"{table}: is not TOML: {error}")
+            for key, value in read_toml(table).items():
+                classes.setdefault(key.casefold(), []).append((key, value))
+        except ReadingError as error:
+            problems += unread(table, error).problems
     files = {}
     for folder in folders:
         if folder.is_dir():
-            files[folder] = sorted(p for p in folder.rglob("*") if p.suffix.lower() == ".cfg")
+            files[folder] = _class_files(folder)
         else:
-            problems.append(f"{folder}: is no folder that can be read")
+            problems.append(f"{printable(str(folder))}: is no folder that can be read")
     if problems:
         raise ScenarioError(problems)
     return Library(table, classes, files)
+
+
+def _class_files(folder: Path) -> dict[str, list[tuple[tuple[str, ...], Path]]]:
+    """Returns the .cfg files below a folder as `Library` has them."""
+    found: dict[str, list[tuple[tuple[str, ...], Path]]] = {}
+    for file in sorted(path for path in folder.rglob("*") if path.suffix.lower() == ".cfg"):
+        own = tuple(part.casefold() for part in file.relative_to(folder).with_suffix("").parts)
+        found.setdefault(own[-1], []).append((own, file))
+    return found
 
 
 def find_class(library: Library, name: str, asked: str) -> VesselClass:
@@ -95,25 +111,25 @@ def find_class(library: Library, name: str, asked: str) -> VesselClass:
     Below a folder the file is, first of all, Vessels/NAME.cfg, then NAME.cfg, then any other.
     Raises ScenarioError with what is missing or wrong.
     """
-    keys = sorted((k for k in library.table if k.casefold() == name.casefold()), key=lambda k: k != name)
-    if keys and library.table_path is not None:
-        return _from_table(Place(library.table_path, key=f"[{keys[0]}]"), library.table[keys[0]])
+    classes = sorted(library.table.get(name.casefold(), ()), key=lambda found: found[0] != name)
+    if classes and library.table_path is not None:
+        key, table = classes[0]
+        return _from_table(Place(library.table_path, key=f"[{printable(key)}]"), table)
     parts = tuple(re.split(r"[\\/]", name.casefold()))
-    for folder, files in library.files.items():
+    for files in library.files.values():
         ranked: dict[int, list[Path]] = {}
-        for file in files:
-            own = tuple(part.casefold() for part in file.relative_to(folder).with_suffix("").parts)
+        for own, file in files.get(parts[-1], ()):
             if own[-len(parts) :] == parts:
                 rank = {("vessels", *parts): 0, parts: 1}.get(own, 2)
                 ranked.setdefault(rank, []).append(file)
         found = ranked[min(ranked)] if ranked else []
         if len(found) > 1:
-            several = " and in ".join(map(str, found))
+            several = listed(map(str, found), len(found), " and in ")
             raise ScenarioError([f"{asked}: class {quantity(name)} is in {several}"])
         if found:
             return _from_cfg(found[0])
-    searched = [str(library.table_path)] if library.table_path else []
-    searched += [f"the .cfg files below {folder}" for folder in library.files]
+    searched = [printable(str(library.table_path))] if library.table_path else []
+    searched += [f"the .cfg files below {printable(str(folder))}" for folder in library.files]
     where = " or ".join(searched) or "any file: neither --config FOLDER nor --table FILE.toml is given"
     raise ScenarioError([f"{asked}: class {quantity(name)} is not in {where}"])
 
@@ -135,7 +151,8 @@ def _from_cfg(path: Path) -> VesselClass:
         elif "=" in line:
             key, _, value = line.partition("=")
             values.setdefault(key.strip().casefold(), (Place(path, number), value.strip()))
-    problems = [f"{path}: BEGIN_{inside} without END_{inside}"] if inside else []
+    shown = printable(str(path))
+    problems = [f"{shown}: BEGIN_{printable(inside)} without END_{printable(inside)}"] if inside else []
     ports = [] if inside else ports
     made = _class_of_values(path, values, ports, problems)
     if made is None or problems:
@@ -160,6 +177,7 @@ def _class_of_values(
             return None
         return found
 
+    shown = printable(str(path))
     if "baseclass" in values:
         place, text = values["baseclass"]
         problems.append(f"{place}: BaseClass = {quantity(text)} is not followed; give the class by --table")
@@ -167,16 +185,23 @@ def _class_of_values(
     pmi, size = read("Inertia", 3, "three numbers >= 0 (m2)"), read("Size", 1, "a number >= 0 (m)")
     if "mass" not in values:
         module = f", its module {quantity(values['module'][1])} has it" if "module" in values else ""
-        problems.append(f"{path}: no Mass{module}; give the class by --table")
+        problems.append(f"{shown}: no Mass{module}; give the class by --table")
     elif "inertia" not in values and "size" not in values:
-        problems.append(f"{path}: neither Inertia nor Size, from which Orbiter would guess it")
+        problems.append(f"{shown}: neither Inertia nor Size, from which Orbiter would guess it")
     tanks = _tanks(values, problems)
+    problems += _too_many(shown, len(lines), len(tanks))
     ports = _old_port(values, problems) + [p for p in (_port(*line, problems) for line in lines) if p]
     if mass is None or (pmi is None and size is None):
         return None
     moments = _moments(pmi, size, values["inertia" if pmi is not None else "size"][0])
     module = values["module"][1] if "module" in values else ""
     return VesselClass(mass[0], values["mass"][0], *moments, tuple(tanks), tuple(ports), module)
+
+
+def _too_many(place: str, ports: int, tanks: int) -> Iterator[str]:
+    for kind, count, most in (("docking ports", ports, MOST_PORTS), ("tanks", tanks, MOST_TANKS)):
+        if count > most:
+            yield f"{place}: {count} {kind}; a class has at most {most}"
 
 
 def _moments(
@@ -256,6 +281,7 @@ def _from_table(place: Place, table: Any) -> VesselClass:
     problems += [] if "empty_mass" in table else [f"{place}: empty_mass is missing"]
     problems += [] if "pmi" in table or "size" in table else [f"{place}: neither pmi nor size"]
     ports = _table_ports(place, table.get("dock", []), problems)
+    problems += _too_many(str(place), len(ports), len(tanks))
     if mass is None or (pmi is None and size is None) or problems:
         raise ScenarioError(problems)
     key = "pmi" if pmi is not None else "size"

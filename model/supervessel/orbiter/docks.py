@@ -1,14 +1,17 @@
 """What DOCKINFO says: which ships hang together, and whether their docks make a tree."""
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections import deque
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from supervessel.orbiter.scenario import Scenario
 from supervessel.orbiter.text import Place
-from supervessel.problems import quantity, unknown
+from supervessel.problems import listed, printable, quantity, unknown
 
 MENTION = re.compile(r"(\d{1,4}):(\d{1,4}),(\S+)", re.ASCII)
+MOST_PATHS = 20
+"""Loops that are told with all the ships on their way round."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +25,7 @@ class Mention:
     place: Place
 
     def __str__(self) -> str:
-        return f"{self.port}:{self.mate_port},{self.mate}"
+        return f"{self.port}:{self.mate_port},{printable(self.mate)}"
 
     @property
     def mirrored(self) -> tuple[str, int, str, int]:
@@ -56,35 +59,51 @@ def assemblies(scenario: Scenario, said: Iterable[Mention]) -> list[list[str]]:
     """Returns the names of ships that hang together, in the order of the file; a free ship is alone."""
     part = {name: [name] for name in scenario.ships}
     for mention in said:
-        if mention.mate in part and part[mention.mate] is not part[mention.ship]:
-            joined = part[mention.ship] + part[mention.mate]
-            for name in joined:
-                part[name] = joined
-    order = list(scenario.ships)
-    distinct = {id(names): sorted(names, key=order.index) for names in part.values()}
-    return list(distinct.values())
+        if mention.mate in part:
+            _join(part, mention.ship, mention.mate)
+    order = {name: number for number, name in enumerate(scenario.ships)}
+    distinct = {id(names): names for names in part.values()}
+    return [sorted(names, key=order.__getitem__) for names in distinct.values()]
 
 
-def docks(scenario: Scenario, members: Sequence[str], said: Iterable[Mention]) -> Iterator[Mention | str]:
+def _join(part: dict[str, list[str]], one: str, other: str) -> bool:
+    """Makes two ships share a list of what hangs together; returns whether they did already."""
+    small, large = sorted((part[one], part[other]), key=len)
+    if small is large:
+        return True
+    large += small
+    part.update(dict.fromkeys(small, large))
+    return False
+
+
+def docks(scenario: Scenario, members: Collection[str], said: Iterable[Mention]) -> Iterator[Mention | str]:
     """Yields the docks of an assembly, each once, and (as texts) what keeps them from making a tree."""
-    own = [mention for mention in said if mention.ship in members]
+    part = {name: [name] for name in members}
+    own = [mention for mention in said if mention.ship in part]
     confirmed = {mention.said for mention in own}
+    by_ship: dict[str, list[Mention]] = {}
+    for mention in own:
+        by_ship.setdefault(mention.ship, []).append(mention)
     taken: dict[tuple[str, int], Mention] = {}
     joined: list[Mention] = []
-    closing: list[Mention] = []
+    seen: set[tuple[str, int, str, int]] = set()
+    loops = 0
     for mention in own:
         where = f"{mention.place}: {quantity(mention.ship)}: DOCKINFO {mention}"
-        problem = _one_sided(scenario, mention, own, confirmed)
+        problem = _one_sided(scenario, mention, by_ship, confirmed)
         end = (mention.ship, mention.port)
         if end in taken:
             yield f"{where}: port {mention.port} is docked already, by {taken[end]}"
         elif problem:
             yield f"{where}: {problem}"
-        elif mention.mirrored not in (dock.said for dock in joined + closing):
-            between = _path(joined, mention.ship, mention.mate)
-            if between:
-                closing.append(mention)
-                yield f"{where}: closes a loop; {' - '.join(between)} are joined already"
+        elif mention.mirrored not in seen:
+            seen.add(mention.said)
+            if _join(part, mention.ship, mention.mate):
+                loops += 1
+                ends = [mention.ship, mention.mate]
+                between = _path(joined, *ends) if loops <= MOST_PATHS else ends
+                shown = listed(between, len(between), " - ")
+                yield f"{where}: closes a loop; {shown} are joined already"
             else:
                 joined.append(mention)
                 yield mention
@@ -94,7 +113,7 @@ def docks(scenario: Scenario, members: Sequence[str], said: Iterable[Mention]) -
 def _one_sided(
     scenario: Scenario,
     mention: Mention,
-    own: Sequence[Mention],
+    by_ship: Mapping[str, Sequence[Mention]],
     confirmed: set[tuple[str, int, str, int]],
 ) -> str:
     """Returns why the mate does not agree, or "" if it does."""
@@ -104,21 +123,27 @@ def _one_sided(
         return "a vessel cannot be docked to itself"
     if mention.mirrored in confirmed:
         return ""
-    theirs = [other for other in own if other.ship == mention.mate]
-    says = f"says {', '.join(map(str, theirs))}" if theirs else "has no DOCKINFO"
+    theirs = by_ship.get(mention.mate, ())
+    says = f"says {listed(map(str, theirs), len(theirs))}" if theirs else "has no DOCKINFO"
     line = f" (line {theirs[0].place.line})" if theirs else ""
     return f"{quantity(mention.mate)} does not agree: it {says}{line}"
 
 
 def _path(joined: Sequence[Mention], start: str, end: str) -> list[str]:
-    """Returns the ships from start to end along docks, [] where none leads there."""
-    paths = {start: [start]}
-    waiting = [start]
-    while waiting:
-        here = waiting.pop(0)
-        for dock in joined:
-            for one, other in ((dock.ship, dock.mate), (dock.mate, dock.ship)):
-                if one == here and other not in paths:
-                    paths[other] = [*paths[here], other]
-                    waiting.append(other)
-    return paths.get(end, [])
+    """Returns the ships from start to end along docks, which lead there."""
+    mates: dict[str, list[str]] = {}
+    for dock in joined:
+        mates.setdefault(dock.ship, []).append(dock.mate)
+        mates.setdefault(dock.mate, []).append(dock.ship)
+    before = {start: start}
+    waiting = deque([start])
+    while end not in before:
+        here = waiting.popleft()
+        for other in mates[here]:
+            if other not in before:
+                before[other] = here
+                waiting.append(other)
+    path = [end]
+    while path[-1] != start:
+        path.append(before[path[-1]])
+    return path[::-1]

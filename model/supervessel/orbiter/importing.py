@@ -8,13 +8,14 @@ from pathlib import Path
 
 from supervessel.consistency import direction_problems
 from supervessel.loading import parse_scene
+from supervessel.naming import MOST_VESSELS
 from supervessel.orbiter.classes import ClassPort, Library, VesselClass, find_class, read_library
 from supervessel.orbiter.docks import Mention, assemblies, docks, mentions
 from supervessel.orbiter.scenario import Entry, Scenario, Ship, read_scenario
 from supervessel.orbiter.start import saved_motion, start_of
 from supervessel.orbiter.text import Note, ScenarioError, numbers
 from supervessel.orbiter.writing import Assembled, Member, Start, scene_text
-from supervessel.problems import SceneError, quantity, unknown
+from supervessel.problems import SceneError, few_suggestions, listed, printable, quantity, unknown
 from supervessel.quantities import triangle_problem
 from supervessel.scene import Convention, Scene
 
@@ -31,6 +32,7 @@ class Imported:
     sources: tuple[Path, ...]
 
 
+@few_suggestions()
 def import_scenario(
     scenario: str | Path,
     vessel: str = "",
@@ -57,6 +59,11 @@ def import_scenario(
         raise ScenarioError([*problems, *error.problems]) from None
     names = next(part for part in parts if root in part)
     names = [root, *(name for name in names if name != root)]
+    if len(names) > MOST_VESSELS:
+        where = printable(str(found.path))
+        raise ScenarioError(
+            [f"{where}: {len(names)} vessels are docked; at most {MOST_VESSELS} are possible"]
+        )
     mated: list[Mention] = []
     for dock in docks(found, names, said):
         problems.append(dock) if isinstance(dock, str) else mated.append(dock)
@@ -116,31 +123,36 @@ def _read(path: Path, folders: Sequence[Path], table: Path | None) -> tuple[Scen
 def _root(scenario: Scenario, vessel: str, parts: Sequence[Sequence[str]]) -> str:
     """Returns the name of the root. Raises ScenarioError where it cannot be told."""
     name = vessel or scenario.focus
-    docked = [" + ".join(part) for part in parts if len(part) > 1]
-    offer = f"; docked are {'; '.join(docked)}" if docked else "; no vessels are docked"
+    where = printable(str(scenario.path))
+    docked = [listed(part, len(part), " + ") for part in parts if len(part) > 1]
+    offer = f"; docked are {listed(docked, len(docked), '; ')}" if docked else "; no vessels are docked"
     if not name:
-        raise ScenarioError([f"{scenario.path}: names no focus vessel; give one by --vessel{offer}"])
+        raise ScenarioError([f"{where}: names no focus vessel; give one by --vessel{offer}"])
     if name not in scenario.ships:
         which = "" if vessel else "focus "
-        raise ScenarioError([f"{scenario.path}: {unknown(which + 'vessel', name, scenario.ships)}{offer}"])
+        raise ScenarioError([f"{where}: {unknown(which + 'vessel', name, scenario.ships)}{offer}"])
     if not vessel and not any(name in part and len(part) > 1 for part in parts):
         focus = f"the focus vessel {quantity(name)} is not docked"
-        raise ScenarioError([f"{scenario.path}: {focus}; give one by --vessel{offer}"])
+        raise ScenarioError([f"{where}: {focus}; give one by --vessel{offer}"])
     return name
 
 
 def _classes(
     scenario: Scenario, names: Sequence[str], library: Library, problems: list[str]
 ) -> dict[str, VesselClass]:
-    """Returns the classes of ships by their names, without those that cannot be had."""
-    classes = {}
+    """Returns the classes of ships by their names, without those that cannot be had: each is told once."""
+    found: dict[str, VesselClass | None] = {}
     for name in names:
         ship = scenario.ships[name]
+        if ship.class_name in found:
+            continue
         try:
-            classes[name] = find_class(library, ship.class_name, f"{ship.place}: {quantity(name)}")
+            found[ship.class_name] = find_class(library, ship.class_name, f"{ship.place}: {quantity(name)}")
         except ScenarioError as error:
+            found[ship.class_name] = None
             problems += error.problems
-    return classes
+    classes = {name: found[scenario.ships[name].class_name] for name in names}
+    return {name: made for name, made in classes.items() if made is not None}
 
 
 def _used_ports(
@@ -208,7 +220,7 @@ def _levels(ship: Ship, problems: list[str]) -> Levels:
         if match is None:
             problems.append(f"{entry.place}: PRPLEVEL {quantity(word)}: must be TANK:LEVEL")
         elif int(match[1]) in given:
-            problems.append(f"{entry.place}: PRPLEVEL {word}: tank {match[1]} has a level already")
+            problems.append(f"{entry.place}: PRPLEVEL {printable(word)}: tank {match[1]} has a level already")
         else:
             given[int(match[1])] = _fraction(entry, [match[2]], problems)
     return Levels(entry, given, 0.0)
@@ -239,7 +251,9 @@ def _masses(
 def _fraction(entry: Entry, words: Sequence[str], problems: list[str]) -> float:
     level = numbers(words, 1)
     if level is None or not 0.0 <= level[0] <= 1.0:
-        problems.append(f"{entry.place}: {entry.key} {' '.join(words)}: a level must be a number from 0 to 1")
+        problems.append(
+            f"{entry.place}: {entry.key} {printable(' '.join(words))}: a level must be a number from 0 to 1"
+        )
         return 0.0
     return level[0]
 
@@ -289,5 +303,5 @@ def _checked(parts: Assembled, start: Start) -> Scene:
     try:
         return parse_scene(tomllib.loads(scene_text(parts, start)))
     except SceneError as error:
-        made = f"{parts.scenario.path}: the scene made of it"
+        made = f"{printable(str(parts.scenario.path))}: the scene made of it"
         raise ScenarioError(f"{made}: {problem}" for problem in error.problems) from None

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from supervessel.orbiter.text import Place, ScenarioError, read_lines
-from supervessel.problems import quantity
+from supervessel.problems import printable, quantity
 
 KEYS = frozenset({"STATUS", "RPOS", "AROT", "VROT", "PRPLEVEL", "FUEL", "DOCKINFO", "ATTACHED"})
 """Keys of a ship that are read; a ship has each at most once."""
@@ -20,7 +20,7 @@ class Entry:
     words: tuple[str, ...]
 
     def __str__(self) -> str:
-        return " ".join((self.key, *self.words))
+        return printable(" ".join((self.key, *self.words)))
 
 
 @dataclass(frozen=True)
@@ -70,13 +70,14 @@ def read_scenario(path: Path) -> Scenario:
 
 def _block(path: Path, lines: Sequence[str], name: str, problems: list[str]) -> list[tuple[int, str]]:
     """Returns the lines, numbered, between BEGIN_name and END_name that are not empty."""
+    shown = printable(str(path))
     capitals = [line.upper() for line in lines]
     if f"BEGIN_{name}" not in capitals:
-        problems.append(f"{path}: has no BEGIN_{name}")
+        problems.append(f"{shown}: has no BEGIN_{name}")
         return []
     begin = capitals.index(f"BEGIN_{name}")
     if f"END_{name}" not in capitals[begin:]:
-        problems.append(f"{path}:{begin + 1}: BEGIN_{name} without END_{name}")
+        problems.append(f"{shown}:{begin + 1}: BEGIN_{name} without END_{name}")
         return []
     end = capitals.index(f"END_{name}", begin)
     return [(i + 1, lines[i]) for i in range(begin + 1, end) if lines[i]]
@@ -97,7 +98,7 @@ def _ships(path: Path, block: list[tuple[int, str]], problems: list[str]) -> Ite
             key, *words = text.split()
             entries.append(Entry(place, key.upper(), tuple(words)))
     if head is not None:
-        problems.append(f"{path}:{head[0]}: {quantity(head[1])} without END")
+        problems.append(f"{Place(path, head[0])}: {quantity(head[1])} without END")
 
 
 def _ship(place: Place, head: str, entries: list[Entry], problems: list[str]) -> Iterator[Ship]:

@@ -6,15 +6,21 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from supervessel.problems import LONGEST_PROBLEM, first, lines, printable
+from supervessel.reading import LARGEST_TEXT, ReadingError, read_text
+
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 class ScenarioError(ValueError):
-    """Files that make no scene; `problems` holds a line for each thing that is wrong with them."""
+    """Files that make no scene; `problems` holds a line for each thing that is wrong with them.
+
+    Its text is the first of them, as `SceneError` has it.
+    """
 
     def __init__(self, problems: Iterable[str]) -> None:
-        self.problems = tuple(problems)
-        super().__init__("\n".join(self.problems))
+        self.problems = lines(problems)
+        super().__init__("\n".join(first(self.problems)))
 
 
 @dataclass(frozen=True)
@@ -27,12 +33,14 @@ class Place:
 
     def __str__(self) -> str:
         """As it stands before a problem."""
-        return f"{self.path}:{self.line}" if self.line else f"{self.path}: {self.key}"
+        path = printable(str(self.path))
+        return f"{path}:{self.line}" if self.line else f"{path}: {self.key}"
 
     @property
     def short(self) -> str:
         """As a comment in a scene has it."""
-        return f"{self.path.name} line {self.line}" if self.line else f"{self.path.name} {self.key}"
+        name = printable(self.path.name)
+        return f"{name} line {self.line}" if self.line else f"{name} {self.key}"
 
 
 @dataclass(frozen=True)
@@ -43,35 +51,30 @@ class Note:
     text: str
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.text}"
+        return printable(f"{self.place}: {self.text}", LONGEST_PROBLEM)
 
     @property
     def short(self) -> str:
         """As a comment in a scene has it."""
-        return f"{self.place.short}: {self.text}"
+        return printable(f"{self.place.short}: {self.text}", LONGEST_PROBLEM)
 
 
-def read_text(path: Path) -> str:
-    """Returns the text of a file. Raises ScenarioError where it cannot be read or is no UTF-8."""
-    try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise ScenarioError([f"{path}: cannot be read: {error.strerror}"]) from None
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = raw.count(b"\n", 0, error.start) + 1
-        byte = raw[error.start]
-        raise ScenarioError([f"{path}:{line}: is not UTF-8 text (byte 0x{byte:02x})"]) from None
-    if "\0" in text:
-        line = text.count("\n", 0, text.index("\0")) + 1
-        raise ScenarioError([f"{path}:{line}: is not UTF-8 text (byte 0x00)"])
-    return text
+def unread(path: Path, error: ReadingError) -> ScenarioError:
+    """Returns what `read_text` or `read_toml` says, with its place."""
+    shown = printable(str(path))
+    return ScenarioError([f"{shown}:{error.line}: {error}" if error.line else f"{shown}: {error}"])
 
 
 def read_lines(path: Path) -> list[str]:
-    """Returns the lines of a file without comments (from a semicolon on) and outer blanks."""
-    return [line.partition(";")[0].strip() for line in read_text(path).split("\n")]
+    """Returns the lines of a file without comments (from a semicolon on) and outer blanks.
+
+    Raises ScenarioError where it cannot be read.
+    """
+    try:
+        text = read_text(path, LARGEST_TEXT)
+    except ReadingError as error:
+        raise unread(path, error) from None
+    return [line.partition(";")[0].strip() for line in text.split("\n")]
 
 
 def numbers(words: Sequence[str], count: int) -> tuple[float, ...] | None:
@@ -80,8 +83,3 @@ def numbers(words: Sequence[str], count: int) -> tuple[float, ...] | None:
         return None
     values = tuple(float(word) for word in words)
     return values if all(map(math.isfinite, values)) else None
-
-
-def printable(text: str) -> str:
-    """Returns a text as a comment may hold it: what cannot be printed becomes a question mark."""
-    return "".join(character if character.isprintable() else "?" for character in text)

@@ -4,16 +4,18 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from supervessel.naming import IDENTIFIER, RESERVED
+from supervessel.naming import DEVICE, IDENTIFIER, LONGEST_NAME, RESERVED
 from supervessel.orbiter.classes import ClassPort, VesselClass
 from supervessel.orbiter.docks import Mention
 from supervessel.orbiter.frames import mirrored
 from supervessel.orbiter.scenario import Scenario, Ship
-from supervessel.orbiter.text import Note, printable
-from supervessel.problems import quantity
+from supervessel.orbiter.text import Note
+from supervessel.problems import LONGEST_PROBLEM, printable, quantity
 
-LONGEST_NAME = 60
+LONGEST_SCENE_NAME = 60
 """Letters of a scene's name, which becomes that of a library."""
+LONGEST_PLAIN = 80
+"""Letters that an identifier takes over from a name; a number may follow them."""
 
 
 @dataclass(frozen=True)
@@ -58,26 +60,33 @@ class Assembled:
 def scene_name(stem: str) -> str:
     """Returns a name for a scene: the file's, in small letters, what is no letter or digit an underscore."""
     words = re.sub(r"[^a-z0-9]+", "_", stem.lower()).strip("_")
-    name = words if words[:1].isalpha() else f"scene_{words}"
-    return name[:LONGEST_NAME].strip("_")
+    usable = words[:1].isalpha() and not DEVICE.fullmatch(words)
+    name = words if usable else f"scene_{words}"
+    return name[:LONGEST_SCENE_NAME].strip("_")
 
 
 def identifiers(names: Sequence[str]) -> dict[str, str]:
     """Returns an identifier for each name: itself where it is one, else a similar one that nobody has."""
-    usable = [name for name in names if IDENTIFIER.fullmatch(name) and name not in RESERVED]
-    taken = set(usable) | RESERVED
+    usable = {name for name in names if _is_usable(name)}
+    taken = usable | RESERVED
+    last: dict[str, int] = {}
     found = {}
     for name in names:
         if name in usable:
             found[name] = name
             continue
-        plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
+        plain = re.sub(r"[^A-Za-z0-9_]", "_", name[:LONGEST_PLAIN])
         plain = plain if IDENTIFIER.fullmatch(plain) else f"_{plain}"
-        number, found[name] = 2, plain
+        found[name] = plain
         while found[name] in taken:
-            found[name], number = f"{plain}_{number}", number + 1
+            last[plain] = last.get(plain, 1) + 1
+            found[name] = f"{plain}_{last[plain]}"
         taken.add(found[name])
     return found
+
+
+def _is_usable(name: str) -> bool:
+    return len(name) <= LONGEST_NAME and IDENTIFIER.fullmatch(name) is not None and name not in RESERVED
 
 
 def scene_text(parts: Assembled, start: Start) -> str:
@@ -142,4 +151,4 @@ def _vector(values: Sequence[float]) -> str:
 
 
 def _comment(text: str) -> str:
-    return f"# {printable(text)}"
+    return f"# {printable(text, LONGEST_PROBLEM)}"

@@ -7,6 +7,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
+from supervessel.problems import shown_message
 from supervessel.scene import MOST_STEPS, Experiment, Scene
 
 Array = NDArray[np.float64]
@@ -25,7 +26,10 @@ ACTIONS = ("torque", "force")
 
 
 class TradeError(RuntimeError):
-    """A trade that cannot be made; the message says why."""
+    """A trade that cannot be made; the message says why, in lines that can be shown."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(shown_message(message))
 
 
 @dataclass(frozen=True)

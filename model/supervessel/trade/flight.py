@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supervessel.equations import Equations, equations
+from supervessel.problems import printable
 from supervessel.processes import Workers, run
 from supervessel.scene import Scene
 from supervessel.trade.choices import SHOWN, Choice, variant_of
@@ -93,7 +94,7 @@ def workshop(*, trial: bool = False) -> Iterator[Workshop]:
             yield Workshop(Path(name), {}, trial)
     except OSError as error:
         place = error.filename or tempfile.gettempdir()
-        raise TradeError(f"{place}: no room to work in: {error.strerror}") from None
+        raise TradeError(f"{printable(str(place))}: no room to work in: {error.strerror}") from None
 
 
 def fly_all(
@@ -393,7 +394,7 @@ def write_all(folder: Path, files: Mapping[str, bytes]) -> None:
         for name, part in parts.items():
             part.replace(folder / name)
     except OSError as error:
-        raise TradeError(f"{folder}: cannot be written: {error.strerror}") from None
+        raise TradeError(f"{printable(str(folder))}: cannot be written: {error.strerror}") from None
     finally:
         for part in parts.values():
             part.unlink(missing_ok=True)
