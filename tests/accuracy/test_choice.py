@@ -3,7 +3,6 @@
 import json
 import shutil
 import zipfile
-from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -20,6 +19,7 @@ from supervessel.trade.choices import BEST, Choice
 from supervessel.trade.experiment import course_of
 from supervessel.trade.flight import Inputs, build_all, run_host, source_of, workshop
 from support import ISS_DG, variant
+from support.processes import kept_in
 
 ACCURACY = {"attitude": 1e-4, "horizon": 20.0, "step": 0.5}
 TORQUE = 2e4
@@ -91,7 +91,7 @@ def test_the_evidence_is_in_the_fmu_and_the_fmu_is_the_same_each_time(tmp_path):
 
 
 def test_what_is_kept_and_what_is_found_anew_are_the_same(cache):
-    kept = Path(cache) / "accuracy"
+    kept = kept_in(cache) / "accuracy"
     found = choose(parse_scene(SPIN))
     assert list(kept.iterdir())
     shutil.rmtree(kept)

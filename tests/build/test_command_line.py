@@ -276,8 +276,8 @@ def test_a_cold_cache_gives_the_same_bytes_as_a_warm_one(homeless, folder):
 @needs_root
 def test_a_user_without_a_home_has_a_cache_that_can_be_written():
     script = (
-        "import os; from fmu_build.compiler import compiler_cache; os.setuid(54321); "
-        "folder = compiler_cache(); print(os.access(folder, os.W_OK)); folder.rmdir()"
+        "import os; from fmu_build.cache import cache_folder; os.setuid(54321); "
+        "folder = cache_folder(); print(os.access(folder, os.W_OK)); folder.rmdir()"
     )
     variables = {
         k: v for k, v in os.environ.items() if k not in ("HOME", "XDG_CACHE_HOME", "SUPERVESSEL_CACHE")
