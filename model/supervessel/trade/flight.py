@@ -377,7 +377,7 @@ def _maker() -> list[str]:
 def read(place: Path, is_whole: Callable[[Any], bool] = lambda _: True) -> Any:
     """Returns what `keep` has kept in a place, None where there is anything else.
 
-    is_whole : whether what has been read is what is expected; what it raises where a part is missing, or another, says no
+    is_whole : whether what has been read is what is expected; an error for want of a part says no
     """
     from fmu_build.cache import read_file  # noqa: PLC0415
 
