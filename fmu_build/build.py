@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from fmu_build.cache import cache_folder, kept_sources, reason
 from fmu_build.changes import change_tables
 from fmu_build.codegen import digest, model_source, scene_header, scene_source
-from fmu_build.compiler import FLAGS, compile_binaries, compiler_cache
+from fmu_build.compiler import FLAGS, compile_binaries
 from fmu_build.documentation import documentation
 from fmu_build.errors import BuildError
 from fmu_build.loop import loop_functions, loop_source, loop_steps, loop_tables
@@ -148,37 +149,15 @@ def compile_sources(  # noqa: PLR0913, PLR0917
     names      : of the C files among them
     identifier : the FMU's modelIdentifier
     flags      : of the compiler
-    Raises BuildError if the compiler fails, or if there is no room for what it makes.
+    Raises BuildError if the compiler fails, or if what it reads and makes cannot be written.
     """
     whole = "".join(f'#include "sources/{name}"\n' for name in names)
     try:
-        folder = _kept({**packed, WHOLE: whole.encode()})
-        return compile_binaries([WHOLE], folder, platforms, fmi, identifier, flags)
+        folder = kept_sources({**packed, WHOLE: whole.encode()})
     except OSError as error:
-        raise BuildError(f"{error.filename}: no room to compile in: {error.strerror}") from None
-
-
-def _kept(files: Mapping[str, bytes]) -> Path:
-    """Returns a folder in the compiler's cache with these files, by path.
-
-    The same files are in the same folder again: only then does the compiler know what it has built.
-    """
-    kept = compiler_cache() / "sources"
-    folder = kept / digest(*(part for path, text in sorted(files.items()) for part in (path, text))).strip(
-        "{}"
-    )
-    if folder.is_dir():
-        return folder
-    kept.mkdir(exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=kept) as name:
-        part = Path(name, "whole")
-        for path, text in files.items():
-            file = part / path
-            file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_bytes(text)
-        if not folder.is_dir():  # another process may have been faster
-            part.replace(folder)
-    return folder
+        place = error.filename or cache_folder()
+        raise BuildError(f"{printable(str(place))}: {reason(error, 'to compile in')}") from None
+    return compile_binaries([WHOLE], folder, platforms, fmi, identifier, flags)
 
 
 def _check_output(output: Path) -> None:

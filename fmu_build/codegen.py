@@ -1,19 +1,22 @@
 """C that is particular to a scene: the generated equations, the variable table and the scene's numbers."""
 
 import hashlib
+import os
 import re
 import tempfile
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
 
 import casadi as ca
 
+from fmu_build.cache import reason
 from fmu_build.changes import change_constants
 from fmu_build.errors import BuildError
 from fmu_build.loop import Tables, loop_constants
 from fmu_build.table import Entry
+from fmu_build.temporary import temporary_folder
 from supervessel.equations import Equations
+from supervessel.problems import printable
 from supervessel.propagators.free_motion import FIRST_ANGLE, LARGEST_TURN
 from supervessel.propagators.theta import CONSTANTS
 from supervessel.scene import Scene
@@ -37,13 +40,30 @@ def model_source(functions: Iterable[ca.Function]) -> str:
     generator = ca.CodeGenerator("model.c", {"with_export": False, "casadi_int": "int", "verbose": False})
     for function in functions:
         generator.add(function)
-    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+    with warnings.catch_warnings():
         warnings.simplefilter("error")
-        generator.generate(f"{folder}/")
-        source = (Path(folder) / "model.c").read_text()
+        source = generated(generator, "model.c")
     if "#error" in source:
         raise BuildError("the equations hold something that cannot be generated as C")
     return '#include "model.h"\n\n' + _without_null_checks(source)
+
+
+def generated(generator: ca.CodeGenerator, file: str) -> str:
+    """Returns the C that a generator writes into a file of that name, by way of a temporary folder.
+
+    Raises BuildError where that folder cannot be used.
+    """
+    try:
+        with temporary_folder() as folder:
+            os.fsencode(folder).decode()  # CasADi drops what is no UTF-8, and writes elsewhere
+            generator.generate(f"{folder}/")
+            return (folder / file).read_text()
+    except UnicodeDecodeError:
+        raise BuildError(f"{tempfile.gettempdir()!a}: must be UTF-8, to be worked in") from None
+    except (OSError, RuntimeError) as error:
+        where = f"{printable(str(tempfile.gettempdir()))}: C cannot be written there"
+        why = reason(error, "for it") if isinstance(error, OSError) else str(error)
+        raise BuildError(f"{where}: {why}") from None
 
 
 def _without_null_checks(source: str) -> str:

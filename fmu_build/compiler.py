@@ -1,20 +1,18 @@
 """C to shared libraries, with the compiler that comes in the `ziglang` wheel."""
 
-import atexit
-import functools
-import importlib.util
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Sequence
+from importlib.machinery import PathFinder
 from pathlib import Path
 
+from fmu_build.cache import cache_folder, count_compilation, reason
 from fmu_build.errors import BuildError
 from fmu_build.platforms import PLATFORMS, Platform, library_contents
 from fmu_build.universal import universal_library
+from supervessel.problems import printable
 from supervessel.processes import Workers, run
 
 TIME_LIMIT = 1800.0  # s; a first build for Windows compiles its C runtime: minutes on two busy cores
@@ -29,12 +27,13 @@ TRIAL_FLAGS = (*(flag for flag in FLAGS if flag != "-O2"), "-O0", "-fno-sanitize
 """For libraries that are flown a few times: compiled in a fifth of the time, the same numbers."""
 
 
+NEEDED = ("SYSTEMROOT", "TEMP", "TMP") if os.name == "nt" else ()
+"""Variables that compilers get from the user's surroundings: without them Windows starts no program."""
+
+
 def fmi_headers() -> Path:
     """Returns the folder of the FMI standard's headers, as the fmpy package carries them."""
-    spec = importlib.util.find_spec("fmpy")
-    if spec is None or spec.origin is None:
-        raise BuildError("package fmpy is not installed; it carries the headers of the FMI standard")
-    return Path(spec.origin).parent / "c-code"
+    return _package("fmpy") / "c-code"
 
 
 def compile_binaries(  # noqa: PLR0913, PLR0917
@@ -72,10 +71,8 @@ def _thin_libraries(
     """Returns the library of each platform; those that fail are all named in one BuildError."""
 
     def compiled(platform: Platform) -> bytes:
-        with tempfile.TemporaryDirectory(prefix="supervessel-") as made:
-            library = Path(made, f"{model_identifier}{platform.suffix}")
-            compile_library([Path(name) for name in sources], platform, library, flags, folder)
-            return library.read_bytes()
+        name = f"{model_identifier}{platform.suffix}"
+        return _compiled([Path(source) for source in sources], platform, name, flags, folder)
 
     libraries, problems = {}, []
     with Workers(AT_ONCE) as pool:
@@ -100,79 +97,82 @@ def compile_library(
 
     sources : C files, their headers beside them
     folder  : what relative paths are relative to, by default the working folder
-    Raises BuildError with the compiler's own words if it fails, or if it does not end in half an hour.
+    Raises BuildError with the compiler's own words if it fails, or if it does not end in half an hour; or
+    where the library cannot be written.
     """
-    command = [sys.executable, "-m", "ziglang", "cc", "-target", platform.target, *flags]
-    if platform.suffix == ".dylib":
-        command.append(f"-Wl,-install_name,@rpath/{output.name}")
-    command += ["-isystem", str(fmi_headers()), "-o", str(output), *map(str, sources)]
-    if platform.suffix == ".so":
-        command.append("-lm")
-    problem = _run(command, folder)
-    if problem is not None:
-        raise BuildError(f"compiler for {platform.name} {problem}")
-
-
-@functools.cache
-def _sweep(cache: Path) -> None:
-    """Removes what compilers that were ended have left in their cache; those that run are younger."""
-    for left in (cache / "tmp").glob("*"):
-        try:
-            old = time.time() - left.stat().st_mtime > 2.0 * TIME_LIMIT
-        except FileNotFoundError:  # another program was faster
-            continue
-        if old and left.is_dir():
-            shutil.rmtree(left, ignore_errors=True)
-        elif old:
-            left.unlink(missing_ok=True)
-
-
-def _run(command: Sequence[str], folder: Path | None) -> str | None:
-    """Runs the compiler and returns what it did instead of compiling, if so."""
-    cache = compiler_cache()
-    _sweep(cache)
-    kept_in = {"ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": str(cache)}
+    whole = [Path(folder or Path.cwd(), source) for source in sources]
+    library = _compiled(whole, platform, output.name, flags, folder)
     try:
-        done = run(command, TIME_LIMIT, folder, os.environ | kept_in)
+        output.write_bytes(library)
+    except OSError as error:
+        raise BuildError(f"{printable(str(output))}: cannot be written: {reason(error, 'for it')}") from None
+
+
+def _compiled(
+    sources: Sequence[Path], platform: Platform, name: str, flags: Sequence[str], folder: Path | None
+) -> bytes:
+    """Returns the library of that file name. It is made in the cache, whose path the linker can work with."""
+    cache = cache_folder()
+    for source in sources:
+        if set("\n\r") & set(str(source)):
+            raise BuildError(
+                f"{printable(str(source))}: the compiler reads no file whose path holds a line break"
+            )
+    command = [str(compiler()), "cc", "-target", platform.target, *flags]
+    if platform.suffix == ".dylib":
+        command.append(f"-Wl,-install_name,@rpath/{name}")
+    try:
+        with tempfile.TemporaryDirectory(dir=cache, prefix="made-") as made:
+            output = Path(made, name)
+            command += ["-isystem", str(fmi_headers()), "-o", str(output), *map(str, sources)]
+            if platform.suffix == ".so":
+                command.append("-lm")
+            problem = _run(command, folder, cache)
+            count_compilation(cache)
+            if problem is not None:
+                raise BuildError(f"compiler for {platform.name} {problem}")
+            return output.read_bytes()
+    except OSError as error:
+        place = error.filename or cache
+        raise BuildError(f"{printable(str(place))}: {reason(error, 'to compile in')}") from None
+
+
+def _run(command: Sequence[str], folder: Path | None, cache: Path) -> str | None:
+    """Runs the compiler and returns what it did instead of compiling, if so."""
+    kept_in = f"The compiler's cache is {printable(str(cache))}; `supervessel cache --clear` removes it"
+    try:
+        done = run(command, TIME_LIMIT, folder, environment(cache))
     except subprocess.TimeoutExpired:
-        return f"did not end within {TIME_LIMIT:g} s; its cache is {cache}"
+        return f"did not end within {TIME_LIMIT:g} s.\n{kept_in}"
     if done.returncode == 0:
         return None
-    return f"failed:\n{(done.stderr or done.stdout).strip()}\nThe compiler's cache is {cache}"
+    return f"failed:\n{(done.stderr or done.stdout).strip()}\n{kept_in}"
 
 
-def compiler_cache() -> Path:
-    """Returns a folder where the compiler may keep what it has compiled.
+def environment(cache: Path) -> dict[str, str]:
+    """Returns all the variables that a compiler gets: its result depends on no other."""
+    kept = {"ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": str(cache)}
+    return kept | {name: os.environ[name] for name in NEEDED if name in os.environ}
 
-    SUPERVESSEL_CACHE names it; else it is the user's cache folder, or where that cannot be written a
-    temporary one until the program ends (the compiler never ends without a cache that it can write).
-    """
-    if named := os.environ.get("SUPERVESSEL_CACHE"):
-        folder = Path(named).absolute()
-        if _can_write(folder):
-            return folder
-        raise BuildError(f"SUPERVESSEL_CACHE = {named}: is no folder that can be written")
+
+def compiler() -> Path:
+    """Returns the compiler's program, of the installed package ziglang, never of the working folder."""
+    program = _package("ziglang") / ("zig.exe" if os.name == "nt" else "zig")
+    if not program.is_file():
+        raise BuildError(
+            f"{printable(str(program))}: there is no such file; package ziglang carries the compiler"
+        )
+    return program
+
+
+def _package(name: str) -> Path:
+    """Returns the folder of an installed package, never one in the working folder: that may be anybody's."""
     try:
-        system = os.environ.get("XDG_CACHE_HOME" if os.name != "nt" else "LOCALAPPDATA")
-        folder = (Path(system) if system else Path.home() / ".cache").absolute() / "supervessel"
-    except RuntimeError:  # a user without a home
-        return _temporary_cache()
-    return folder if _can_write(folder) else _temporary_cache()
-
-
-@functools.cache
-def _temporary_cache() -> Path:
-    """Returns a folder that all builds of this program share; it is removed at the end."""
-    folder = tempfile.mkdtemp(prefix="supervessel-")
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return Path(folder)
-
-
-def _can_write(folder: Path) -> bool:
-    """Whether a folder is there, or can be made, and takes files."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return True
-    except OSError:
-        return False
+        here = os.path.realpath(Path.cwd())
+    except FileNotFoundError:  # it has been removed
+        here = ""
+    path = [place for place in sys.path if place and os.path.realpath(place) != here]
+    spec = PathFinder.find_spec(name, path)
+    if spec is None or spec.origin is None:
+        raise BuildError(f"package {name} is not installed")
+    return Path(spec.origin).parent.absolute()

@@ -3,7 +3,7 @@
 import os
 import tempfile
 
-from fmu_build.compiler import compiler_cache
+from fmu_build.cache import cache_folder
 
 
 def pytest_configure(config):
@@ -15,4 +15,4 @@ def pytest_configure(config):
         folder = tempfile.TemporaryDirectory(prefix="supervessel-test-", ignore_cleanup_errors=True)
         os.environ["SUPERVESSEL_TESTS"] = folder.name
         config.add_cleanup(folder.cleanup)
-        os.environ |= dict.fromkeys(("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR"), str(compiler_cache()))
+        os.environ |= dict.fromkeys(("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR"), str(cache_folder()))

@@ -2,6 +2,7 @@
 
 supervessel import FILE.scn [...] -o SCENE.toml
 supervessel trade SCENE.toml [-o FOLDER] [--quick] [--duration S]
+supervessel cache [--clear]
 """
 
 import argparse
@@ -30,6 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     _add_import(commands.add_parser("import", help="make a scene file from Orbiter's files"))
     _add_trade(commands.add_parser("trade", help="measure what accuracy costs in a scene"))
+    _add_cache(commands.add_parser("cache", help="show what is kept from run to run, or clear it"))
     options = parser.parse_args(arguments)
     with interrupted_once():
         try:
@@ -144,6 +146,24 @@ def _trade(options: argparse.Namespace) -> int:
         )
         return 1
     return print_results(f"{tables}\n\n{folder}", f"the trade is written to {folder}, its tables")
+
+
+def _add_cache(parser: argparse.ArgumentParser) -> None:
+    parser.description = "Show where compiled code and results are kept, how much, and whether that is used."
+    parser.add_argument("--clear", action="store_true", help="remove it, nothing but supervessel-N")
+    parser.set_defaults(run=_cache)
+
+
+def _cache(options: argparse.Namespace) -> int:
+    from fmu_build.cache_report import clear, report  # noqa: PLC0415
+    from fmu_build.errors import BuildError  # noqa: PLC0415
+
+    try:
+        said = clear() if options.clear else report()
+    except BuildError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return print_results(said, "the cache's content")
 
 
 @contextmanager

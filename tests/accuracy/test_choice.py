@@ -3,7 +3,6 @@
 import json
 import shutil
 import zipfile
-from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -18,8 +17,9 @@ from supervessel.equations import equations
 from supervessel.scene import without_accuracy
 from supervessel.trade.choices import BEST, Choice
 from supervessel.trade.experiment import course_of
-from supervessel.trade.flight import Inputs, build_all, run_host, source_of, workshop
+from supervessel.trade.flight import Inputs, build_all, keep, read, run_host, source_of, workshop
 from support import ISS_DG, variant
+from support.processes import kept_in
 
 ACCURACY = {"attitude": 1e-4, "horizon": 20.0, "step": 0.5}
 TORQUE = 2e4
@@ -91,11 +91,67 @@ def test_the_evidence_is_in_the_fmu_and_the_fmu_is_the_same_each_time(tmp_path):
 
 
 def test_what_is_kept_and_what_is_found_anew_are_the_same(cache):
-    kept = Path(cache) / "accuracy"
+    kept = kept_in(cache) / "accuracy"
     found = choose(parse_scene(SPIN))
     assert list(kept.iterdir())
     shutil.rmtree(kept)
     assert choose(parse_scene(SPIN)) == found
+
+
+def one_less(kept, name):
+    return {key: kept[key] for key in kept if key != name}
+
+
+def refused(kept):
+    candidates = [one | {"enough": False} for one in kept["candidates"]]
+    return kept | {"candidates": candidates}
+
+
+WRONG = {
+    "a list": lambda kept: [kept],
+    "a number": lambda kept: 7,
+    "no choice": lambda kept: one_less(kept, "choice"),
+    "no candidates": lambda kept: kept | {"candidates": []},
+    "a choice that was not tried": lambda kept: kept | {"choice": kept["choice"] | {"max_angle_step": 0.9}},
+    "a choice that is not enough": refused,
+    "no choice of a rotation": lambda kept: kept | {"choice": {"law": "any", "propagator": "rk4"}},
+    "another scene's": lambda kept: kept | {"scene": "other"},
+    "an answer to another wish": lambda kept: kept | {"asked": kept["asked"] | {"attitude": 0.1}},
+    "a text for a number": lambda kept: kept | {"attitude": "1"},
+    "numbers for names": lambda kept: kept | {"histories": [1, 2]},
+    "no doubt": lambda kept: kept | {"doubt": {}},
+    "another claim": lambda kept: kept | {"claim": "It is exact."},
+}
+"""What may be kept in the place of a choice, whole in itself."""
+
+
+def test_what_is_no_choice_for_the_scene_is_found_anew(cache):
+    scene = parse_scene(SPIN)
+    found = choose(scene)
+    places = [path for path in (kept_in(cache) / "accuracy").iterdir() if "candidates" in path.read_text()]
+    [place] = [path for path in places if (read(path) or {}).get("scene") == "spin"]
+    kept = read(place)
+    for name, wrong in WRONG.items():
+        keep(place, wrong(kept))
+        assert choose(scene) == found, name
+        assert read(place) == kept, name
+
+
+def test_what_are_no_errors_of_flights_is_flown_anew(cache):
+    """Attitudes, rates and sub-steps of each flight, or why there are none."""
+    scene = parse_scene(SPIN)
+    found = choose(scene)
+    folder = kept_in(cache) / "accuracy"
+    kept = {path: content for path in folder.iterdir() if "sub_steps" in (content := read(path))}
+    wrong = ({"attitude": []}, {"attitude": ["1"]}, {"sub_steps": 7}, {"refused": 7}, {"more": 1})
+    assert kept
+    for change in wrong:
+        for path in folder.iterdir():
+            if path in kept:
+                keep(path, kept[path] | change)
+            else:
+                path.unlink()
+        assert choose(scene) == found, change
 
 
 def test_the_twin_takes_the_same_choice(tmp_path):

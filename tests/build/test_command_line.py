@@ -10,6 +10,9 @@ from pathlib import Path
 import pytest
 from fmpy import read_model_description
 
+from support.compilers import fake_compiler
+from support.processes import needs_posix
+
 ROOT = Path(__file__).parents[2]
 
 SCENE = """\
@@ -199,24 +202,32 @@ def test_a_full_temporary_folder_is_a_failure_without_traceback(folder):
     assert (done.returncode, done.stdout, files(folder)) == (1, "", ["ball.toml"])
 
 
-def test_a_compiler_that_fails_is_quoted_on_stderr(folder):
-    done = run(folder, "ball.toml", ZIG_LIB_DIR=folder / "ball.toml")
+@needs_posix
+def test_a_compiler_that_fails_is_quoted_on_stderr(folder, tmp_path_factory):
+    done = run(folder, "ball.toml", PYTHONPATH=failing(tmp_path_factory))
     assert done.stderr.startswith("compiler for ")
-    assert "unable to open zig lib directory" in done.stderr
+    assert "error: no disk, no ink" in done.stderr
     assert done.stderr.splitlines()[-1].startswith("The compiler's cache is ")
     assert "Traceback" not in done.stderr
     assert (done.returncode, done.stdout, files(folder)) == (1, "", ["ball.toml"])
 
 
+def failing(tmp_path_factory):
+    """Returns a PYTHONPATH by which the compiler is one that fails."""
+    folder = fake_compiler(tmp_path_factory.mktemp("failing"), "echo 'error: no disk, no ink' >&2; exit 1")
+    return os.pathsep.join((str(folder), str(ROOT), str(ROOT / "model")))
+
+
+@needs_posix
 @pytest.mark.parametrize("reason", ["the scene", "the compiler", "the compiler's cache"])
-def test_an_old_fmu_survives_a_build_that_fails(folder, reason):
+def test_an_old_fmu_survives_a_build_that_fails(folder, reason, tmp_path_factory):
     output = folder / "ball.fmu"
     output.write_bytes(b"old")
     environment = {}
     if reason == "the scene":
         (folder / "ball.toml").write_text(BROKEN)
     elif reason == "the compiler":
-        environment["ZIG_LIB_DIR"] = folder / "ball.toml"
+        environment["PYTHONPATH"] = failing(tmp_path_factory)
     else:
         environment["SUPERVESSEL_CACHE"] = folder / "ball.toml"
     before = files(folder)
@@ -236,7 +247,7 @@ def test_a_cache_that_cannot_be_written_is_named(folder):
     cache = folder / "ball.toml" / "cache"
     assert_failed(
         run(folder, "ball.toml", SUPERVESSEL_CACHE=cache),
-        f"SUPERVESSEL_CACHE = {cache}: is no folder that can be written",
+        f"SUPERVESSEL_CACHE = {cache}: is no folder that can be written: {os.strerror(errno.ENOTDIR)}",
     )
 
 
@@ -276,8 +287,8 @@ def test_a_cold_cache_gives_the_same_bytes_as_a_warm_one(homeless, folder):
 @needs_root
 def test_a_user_without_a_home_has_a_cache_that_can_be_written():
     script = (
-        "import os; from fmu_build.compiler import compiler_cache; os.setuid(54321); "
-        "folder = compiler_cache(); print(os.access(folder, os.W_OK)); folder.rmdir()"
+        "import os; from fmu_build.cache import cache_folder; os.setuid(54321); "
+        "folder = cache_folder(); print(os.access(folder, os.W_OK))"
     )
     variables = {
         k: v for k, v in os.environ.items() if k not in ("HOME", "XDG_CACHE_HOME", "SUPERVESSEL_CACHE")

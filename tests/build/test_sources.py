@@ -14,7 +14,8 @@ import pytest
 from fmpy.model_description import read_build_description, read_model_description
 from lxml import etree
 
-from fmu_build.compiler import compiler_cache, fmi_headers
+from fmu_build.cache import cache_folder
+from fmu_build.compiler import fmi_headers
 from fmu_build.sources import layer_files, source_file_names, source_files
 from support import ISS_DG, body, built
 
@@ -66,7 +67,7 @@ def run_compiler(folder: Path, fmi: int, command: list[str], *options: str) -> N
     else:
         configurations = read_model_description(str(folder)).buildConfigurations
     sources = configurations[0].sourceFileSets[0].sourceFiles
-    cache = str(compiler_cache())
+    cache = str(cache_folder())
     subprocess.run(
         [*command, "-fPIC", "-I", str(fmi_headers()), *sources, *options],
         cwd=folder / "sources",

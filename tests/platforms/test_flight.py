@@ -15,7 +15,8 @@ import pytest
 from fmpy import read_model_description
 
 from fmu_build import build_fmu
-from fmu_build.compiler import FLAGS, compiler_cache, fmi_headers
+from fmu_build.cache import cache_folder
+from fmu_build.compiler import FLAGS, fmi_headers
 from fmu_build.platforms import PLATFORMS, Platform, host_platform
 from support import ISS_DG, scene, variant
 
@@ -100,7 +101,7 @@ def compile_host(platform: Platform, folder: Path) -> Path:
     command = [sys.executable, "-m", "ziglang", "cc", "-target", platform.target, *flags]
     command += ["-isystem", str(fmi_headers()), f"-I{Path(__file__).parent.parent / 'support'}"]
     command += ["-o", str(program), str(Path(__file__).with_name("host.c"))]
-    cache = str(compiler_cache())
+    cache = str(cache_folder())
     environment = os.environ | {"ZIG_GLOBAL_CACHE_DIR": cache, "ZIG_LOCAL_CACHE_DIR": cache}
     libraries = ["-ldl"] if platform.suffix == ".so" else []
     subprocess.run([*command, *libraries], env=environment, check=True, timeout=1800.0)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from fmu_build.compiler import compiler_cache
+from fmu_build.cache import OURS, cache_folder
 
 ROOT = Path(__file__).parents[2]
 
@@ -24,18 +24,24 @@ COMPILERS = ("b", "h", "o", "tmp", "z", "sources")
 @pytest.fixture(scope="module", autouse=True)
 def cache() -> Iterator[Path]:
     """A cache in which nothing has been flown before; what has been compiled before is in it, where the
-    system lets folders be linked."""
-    common = compiler_cache()
+    system lets folders be linked. What is removed is never reached by these links."""
+    common = cache_folder()
     with (
         pytest.MonkeyPatch.context() as patch,
         tempfile.TemporaryDirectory(prefix="supervessel-test-") as name,
     ):
+        patch.setenv("SUPERVESSEL_CACHE", name)
+        assert cache_folder() == kept_in(Path(name))
         if os.name == "posix":
             for kind in COMPILERS:
                 (common / kind).mkdir(exist_ok=True)
-                Path(name, kind).symlink_to(common / kind)
-        patch.setenv("SUPERVESSEL_CACHE", name)
+                (cache_folder() / kind).symlink_to(common / kind)
         yield Path(name)
+
+
+def kept_in(cache: Path) -> Path:
+    """Returns the folder that results and compiled code are in, of a cache that has just been begun."""
+    return Path(os.path.realpath(cache), OURS, "generation-1")
 
 
 def run(command: Sequence[str], folder: Path, cache: Path) -> subprocess.CompletedProcess[str]:
@@ -52,7 +58,8 @@ def interrupted(
 
     kind : folder of these results in the cache
     """
-    before = set(cache.glob(f"{kind}/*"))
+    generation = kept_in(cache)
+    before = set(generation.glob(f"{kind}/*"))
     running = subprocess.Popen(
         command,
         cwd=folder,
@@ -61,12 +68,12 @@ def interrupted(
         stderr=subprocess.PIPE,
         text=True,
     )
-    while running.poll() is None and not set(cache.glob(f"{kind}/*.json")) - before:
+    while running.poll() is None and not set(generation.glob(f"{kind}/*.json")) - before:
         time.sleep(0.02)
     running.send_signal(signal.SIGINT)
     out, error = running.communicate()
     done = subprocess.CompletedProcess(running.args, running.returncode, out, error)
-    return done, {path: path.read_bytes() for path in set(cache.glob(f"{kind}/*")) - before}
+    return done, {path: path.read_bytes() for path in set(generation.glob(f"{kind}/*")) - before}
 
 
 def _environment(cache: Path) -> dict[str, str]:

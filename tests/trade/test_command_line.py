@@ -1,15 +1,13 @@
 """`supervessel trade`: what it prints and leaves, what it refuses, and that an interrupt loses nothing."""
 
 import json
-import os
 import sys
-import time
 
 import pytest
 
 from supervessel.trade import table
 from support import processes
-from support.processes import needs_posix, run
+from support.processes import kept_in, needs_posix, run
 
 SCENE = """\
 name = "ball"
@@ -47,12 +45,7 @@ def interrupted(tmp_path_factory, cache):
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory, cache, interrupted):
-    """The same trade from its beginning, compilers having left files: its end and its folder."""
-    for name, age in (("old.o.tmp", 7200.0), ("young.o.tmp", 60.0)):
-        left = cache / "tmp" / name
-        left.parent.mkdir(parents=True, exist_ok=True)
-        left.touch()
-        os.utime(left, (time.time() - age, time.time() - age))
+    """The same trade from its beginning: its end and its folder."""
     folder = tmp_path_factory.mktemp("work")
     (folder / "ball.toml").write_text(SCENE)
     return run(command("ball.toml", "--quick", "-o", "out"), folder, cache), folder
@@ -76,12 +69,7 @@ def test_the_same_command_goes_on_from_what_was_kept(interrupted, finished, cach
     assert done.returncode == 0, done.stderr
     for path, content in interrupted[2].items():
         assert path.read_bytes() == content
-    assert len(list(cache.glob("trade/*"))) > len(interrupted[2])
-
-
-def test_what_compilers_left_long_ago_is_removed(finished, cache):
-    """An hour ago none that still runs had begun."""
-    assert [path.name for path in (cache / "tmp").glob("*.o.tmp")] == ["young.o.tmp"]
+    assert len(list(kept_in(cache).glob("trade/*"))) > len(interrupted[2])
 
 
 def test_tables_are_printed_and_all_is_in_the_folder(finished):

@@ -1,5 +1,8 @@
 """The native host flies as an importer does: set, step, get, to the last bit."""
 
+import sys
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 
@@ -8,7 +11,7 @@ from fmu_build.platforms import host_platform
 from supervessel import parse_scene
 from supervessel.trade.choices import BEST, Choice, Model, models, reference_choices, variant_of
 from supervessel.trade.experiment import course_of
-from supervessel.trade.flight import HERE, fly_all, keep, read
+from supervessel.trade.flight import HERE, fly_all, keep, place_of, read
 from support import ISS_DG, OK, Instance, variant
 
 COURSES = {
@@ -113,6 +116,60 @@ def test_what_was_kept_is_read_to_the_last_bit_unless_it_is_changed(tmp_path):
     assert read(place) == found
     place.write_text(place.read_text().replace("5e-324", "1e-323"))
     assert read(place) is None
+
+
+BALL = {
+    "name": "ball",
+    "root": "B",
+    "vessels": {"B": {"mass": 1.0, "pmi": [1.0, 2.0, 2.5]}},
+    "rotation": {"angular_velocity": [0.0, 0.0, 1.0]},
+    "experiment": {"duration": 3.0, "step": 1.0},
+}
+
+WRONG = {
+    "a list": lambda kept: [kept],
+    "a part less": lambda kept: {name: kept[name] for name in kept if name != "ratio"},
+    "a part more": lambda kept: kept | {"more": 1},
+    "a row less": lambda kept: kept | {"samples": kept["samples"][1:]},
+    "no rows": lambda kept: kept | {"samples": []},
+    "short rows": lambda kept: kept | {"samples": [row[1:] for row in kept["samples"]]},
+    "rows of another shape": lambda kept: kept | {"samples": [kept["samples"][0] * 3]},
+    "texts for numbers": lambda kept: kept | {"samples": [[str(x) for x in row] for row in kept["samples"]]},
+    "true for a number": lambda kept: kept | {"sub_steps": True},
+    "a text for a time": lambda kept: kept | {"nanoseconds": "1.0"},
+    "a refusal that is none": lambda kept: kept | {"refused": 7},
+    "a refusal with samples": lambda kept: kept | {"refused": "no"},
+}
+"""What may be kept in the place of a flight, whole in itself."""
+
+
+def test_what_is_no_flight_is_flown_anew(shop):
+    scene, choice = parse_scene(BALL), Choice(BEST, "rk4", 0.05)
+    flown = fly_all(scene, [choice], shop)[choice]
+    place = place_of("trade", scene, asdict(choice))
+    kept = read(place)
+    for name, wrong in WRONG.items():
+        keep(place, wrong(kept))
+        again = fly_all(scene, [choice], shop)[choice]
+        assert again.samples.tolist() == flown.samples.tolist(), name
+        assert again.sub_steps == flown.sub_steps, name
+        assert read(place).keys() == kept.keys(), name
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="an environment is read in /proc")
+def test_the_host_has_no_variables_but_where_its_libraries_are(shop, monkeypatch, tmp_path):
+    """What a flight gives depends on nothing else."""
+    monkeypatch.setenv("LD_PRELOAD", str(tmp_path / "none.so"))
+    monkeypatch.setenv("LD_LIBRARY_PATH", str(tmp_path))
+    scene, choice = parse_scene(BALL), Choice(BEST, "rk4", 0.06)
+    heard = tmp_path / "heard"
+    python = tmp_path / "python"
+    python.write_text(f'#!/bin/sh\ncat /proc/$$/environ > {heard}\nexec {sys.executable} "$@"\n')
+    python.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(python))
+    assert fly_all(scene, [choice], shop)[choice].refused is None
+    variables = [line for line in heard.read_text().split("\0") if line]
+    assert variables == [f"LD_LIBRARY_PATH={tmp_path}"]
 
 
 def test_the_host_compiles_without_warnings(tmp_path):

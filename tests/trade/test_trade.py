@@ -14,6 +14,7 @@ from supervessel.trade.choices import BEST, Choice, label
 from supervessel.trade.experiment import course_of
 from supervessel.trade.flight import fly_all
 from support import variant
+from support.processes import kept_in
 from support.series import flight, mp, norm
 
 U = 2.0**-53
@@ -165,9 +166,9 @@ def test_another_start_is_flown_anew(trade, cache, shop):
     """The kept results are known by all of the scene."""
     scene = parse_scene(variant(STEADY, {"rotation.angular_velocity": [0.3, 0.7, 0.4]}))
     choice = Choice(BEST, "taylor", None, 1e-15)
-    before = set((cache / "trade").iterdir())
+    before = set((kept_in(cache) / "trade").iterdir())
     flown = fly_all(scene, [choice], shop)[choice]
-    assert len(set((cache / "trade").iterdir()) - before) == 1
+    assert len(set((kept_in(cache) / "trade").iterdir()) - before) == 1
     assert flown.samples[0, 6] == pytest.approx(0.4, abs=0.1)
 
 

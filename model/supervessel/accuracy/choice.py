@@ -8,7 +8,7 @@ from supervessel.accuracy.flights import LONG, AccuracyError
 from supervessel.accuracy.search import MARGIN, Progress, Search, Tried, begun
 from supervessel.scene import CHOSEN, Accuracy, Rotation, Scene
 from supervessel.trade.choices import BEST, Choice, reference_choices
-from supervessel.trade.flight import keep, place_of, read, workshop
+from supervessel.trade.flight import are_numbers, keep, place_of, read, workshop
 
 CLAIM = (
     "From the scene's start, in communication steps of that length, with inputs anywhere in their ranges and "
@@ -40,6 +40,10 @@ ABOUT = {
 }
 
 
+COUNTS = ("steps", "looked_at", "rows_drawn", "rows_senseless")
+"""Keys of the evidence that are numbers of things."""
+
+
 def choose(scene: Scene, progress: Progress = lambda _: None) -> tuple[Scene, dict[str, Any]]:
     """Returns the scene with law, propagator and setting that `[accuracy]` asks for, and the evidence.
 
@@ -68,7 +72,7 @@ def choose(scene: Scene, progress: Progress = lambda _: None) -> tuple[Scene, di
     opened = {key: value for key, value in given.items() if key not in CHOSEN}
     whole = scene.model_copy(update={"rotation": Rotation.model_validate(opened)})
     place = place_of("accuracy", whole, "choice")
-    kept = read(place)
+    kept = read(place, lambda kept: _is_evidence(kept, whole, accuracy))
     if kept is None:
         kept = _chosen(whole, accuracy, progress)
         keep(place, kept)
@@ -128,6 +132,33 @@ def _chosen(scene: Scene, accuracy: Accuracy, progress: Progress) -> dict[str, A
             _settings(choice) | {"operations": _brief(at_least)} for choice, at_least in search.left.values()
         ],
     }
+
+
+def _is_evidence(kept: Any, scene: Scene, accuracy: Accuracy) -> bool:
+    """Whether what JSON has given is evidence about this scene, in every part, for the choice in it.
+
+    Where a part is missing, or has another form, that may also show as an error.
+    """
+    opened = scene.rotation.model_dump(exclude_unset=True)
+    choice = kept["choice"]
+    chosen = [one for one in kept["candidates"] if choice.items() <= one.items()]
+    Rotation.model_validate(opened | choice)
+    texts = [*kept["histories"], *kept["truth"], *(one["worst"] for one in kept["candidates"])]
+    numbers = [kept[name] for name in ("attitude", "rate", "operations", *COUNTS)]
+    numbers += [kept["doubt"]["attitude"], kept["doubt"]["rate"]]
+    numbers += [one["operations"] for one in (*kept["candidates"], *kept["dearer"])]
+    for one in kept["candidates"]:
+        numbers += [one["flights"], *((one["attitude"], one["rate"]) if one["refused"] is None else ())]
+    for one in kept["dearer"]:
+        Rotation.model_validate({key: value for key, value in one.items() if key != "operations"})
+    return (
+        (kept["about"], kept["scene"], kept["claim"]) == (ABOUT, scene.name, CLAIM)
+        and (kept["not_covered"], kept["margin"]) == (list(NOT_COVERED), MARGIN)
+        and kept["asked"] == accuracy.model_dump(mode="json")
+        and [(one["enough"], one["refused"]) for one in chosen] == [(True, None)]
+        and are_numbers(numbers)
+        and all(isinstance(text, str) for text in texts)
+    )
 
 
 def _settings(choice: Choice) -> dict[str, Any]:

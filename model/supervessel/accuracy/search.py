@@ -1,8 +1,9 @@
 """Flights of candidates through a scene's histories of inputs, and the cheapest that is exact enough."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from math import ceil, floor, log10
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from supervessel.equations import Equations, equations
 from supervessel.propagators import plan_of
 from supervessel.scene import Accuracy, Law, Scene
 from supervessel.trade.choices import BEST, FINEST, LAWS_TRIED, Choice, Model, reference_choices, variant_of
-from supervessel.trade.flight import Workshop, build_all, keep, place_of, read, source_of
+from supervessel.trade.flight import Workshop, are_numbers, build_all, keep, place_of, read, source_of
 from supervessel.trade.study import HALF_ULP
 
 Array = NDArray[np.float64]
@@ -43,6 +44,18 @@ class Errors:
     rate: list[float]
     sub_steps: list[int]
     refused: str | None = None
+
+
+def _are_errors(kept: Any, histories: int) -> bool:
+    """Whether what JSON has given is `Errors` of so many histories."""
+    columns = [kept[name] for name in ("attitude", "rate", "sub_steps")]
+    refused, lengths = kept["refused"], {len(column) for column in columns}
+    return (
+        kept.keys() == {one.name for one in fields(Errors)}
+        and isinstance(refused, str | None)
+        and lengths == {histories if refused is None else 0}
+        and all(type(column) is list and are_numbers(column) for column in columns)
+    )
 
 
 @dataclass(frozen=True)
@@ -323,7 +336,7 @@ class Search:
         anything = self.accuracy.model_copy(update={"attitude": 1.0, "rate": None})
         flown_in = self.scene.model_copy(update={"accuracy": anything})  # whatever is asked of the flights
         place = place_of("accuracy", flown_in, ["errors", asdict(choice), part.start, part.stop])
-        kept = read(place)
+        kept = read(place, lambda kept: _are_errors(kept, len(part)))
         if kept is not None:
             return Errors(**kept)
         flown = fly(self.scene, self.shop, self.every, choice, part)

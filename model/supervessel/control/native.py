@@ -91,6 +91,8 @@ def _compiled(
 
 def _source(functions: Sequence[ca.Function], file: str, derivatives: int) -> str:
     """Returns the C of functions and of what CasADi looks for when it differentiates an external one."""
+    from fmu_build.codegen import generated  # noqa: PLC0415
+
     generator = ca.CodeGenerator(file, {"verbose": False})
     for function in functions:
         generator.add(function, derivatives > 0)  # with the sparsity of its Jacobian
@@ -100,6 +102,4 @@ def _source(functions: Sequence[ca.Function], file: str, derivatives: int) -> st
         if derivatives > 1:
             generator.add(function.forward(1).forward(1))
             generator.add(function.reverse(1).forward(1))
-    with tempfile.TemporaryDirectory() as folder:
-        generator.generate(f"{folder}/")
-        return (Path(folder) / file).read_text()
+    return generated(generator, file)

@@ -2,13 +2,14 @@
 
 import hashlib
 import json
+import os
 import platform
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -39,6 +40,10 @@ OUT_OF_TIME = f"did not end within {TIME_LIMIT:g} s"
 
 BUILT_WITH = ("casadi", "fmpy", "ziglang")
 """Packages that results depend on."""
+
+LIBRARIES = ("LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH")
+"""Variables without which some Pythons do not start. Libraries of C could come from there, and results depend
+on them: they are part of what a result is kept under."""
 
 AT_ONCE = 2
 """Builds at the same time."""
@@ -88,13 +93,17 @@ class Workshop:
 
 @contextmanager
 def workshop(*, trial: bool = False) -> Iterator[Workshop]:
-    """Yields a workshop, removed afterwards. Raises TradeError where there is no room for it or in it."""
+    """Yields a workshop, removed afterwards. Raises TradeError where it cannot be made or written."""
+    # Package fmu_build is built on this one: looked up only here.
+    from fmu_build.cache import reason  # noqa: PLC0415
+    from fmu_build.temporary import temporary_folder  # noqa: PLC0415
+
     try:
-        with tempfile.TemporaryDirectory(prefix="supervessel-") as name:
-            yield Workshop(Path(name), {}, trial)
+        with temporary_folder() as folder:
+            yield Workshop(folder, {}, trial)
     except OSError as error:
         place = error.filename or tempfile.gettempdir()
-        raise TradeError(f"{printable(str(place))}: no room to work in: {error.strerror}") from None
+        raise TradeError(f"{printable(str(place))}: {reason(error, 'to work in')}") from None
 
 
 def fly_all(
@@ -110,7 +119,7 @@ def fly_all(
     places = {choice: place_of("trade", scene, asdict(choice)) for choice in choices}
     found: dict[Choice, Flown] = {}
     for choice, place in places.items():
-        kept = _read(place)
+        kept = _read(place, len(course.sampled))
         if kept is not None:
             found[choice] = kept
             done(str(choice))
@@ -302,13 +311,20 @@ def run_host(
         file.write_text(json.dumps(whole))
         command = [sys.executable, "-I", str(HERE / "host.py"), str(file)]
         try:
-            ended = run(command, TIME_LIMIT)
+            ended = run(command, TIME_LIMIT, environment=_surroundings())
         except subprocess.TimeoutExpired:
             return None
         if ended.returncode != 0:
             last = (ended.stderr.strip().splitlines() or ["nothing was said"])[-1]
             return f"its flight ended with status {ended.returncode}: {last}"
         return json.loads(ended.stdout), samples.read_bytes()
+
+
+def _surroundings() -> dict[str, str]:
+    """Returns all the variables that a host's process gets: where this Python's own libraries are."""
+    from fmu_build.compiler import NEEDED  # noqa: PLC0415
+
+    return {name: os.environ[name] for name in (*NEEDED, *LIBRARIES) if name in os.environ}
 
 
 def _is_input(built: Built, choice: Choice, name: str) -> bool:
@@ -329,16 +345,17 @@ def place_of(kind: str, scene: Scene, what: Any) -> Path:
     kind : folder in the cache
     what : it was, as JSON takes it
     """
-    from fmu_build.compiler import compiler_cache  # noqa: PLC0415
+    from fmu_build.cache import place_of_result  # noqa: PLC0415
 
     said = json.dumps([scene.model_dump(mode="json"), what, _maker()], sort_keys=True)
-    return compiler_cache() / kind / f"{hashlib.sha256(said.encode()).hexdigest()}.json"
+    return place_of_result(kind, said.encode())
 
 
 @cache
 def _maker() -> list[str]:
     """Returns what turns a choice into a result: this machine, versions, our own files."""
     import fmu_build  # noqa: PLC0415
+    from fmu_build.compiler import compiler  # noqa: PLC0415
 
     files = hashlib.sha256()
     for package in (HERE.parent, Path(fmu_build.__path__[0])):
@@ -346,30 +363,74 @@ def _maker() -> list[str]:
             if file.suffix in (".py", ".c", ".h"):
                 files.update(f"{file.relative_to(package)}\n".encode() + file.read_bytes())
     versions = [version(name) for name in BUILT_WITH]
-    return [platform.node(), platform.machine(), platform.system(), *versions, files.hexdigest()]
+    surroundings = [os.environ.get(name, "") for name in LIBRARIES]
+    compiled_by = [*versions, str(compiler().stat().st_size)]
+    return [
+        platform.node(),
+        platform.machine(),
+        platform.system(),
+        *surroundings,
+        *compiled_by,
+        files.hexdigest(),
+    ]
 
 
-def read(place: Path) -> Any:
-    """Returns what `keep` has kept, None where nothing whole is."""
+def read(place: Path, is_whole: Callable[[Any], bool] = lambda _: True) -> Any:
+    """Returns what `keep` has kept in a place, None where there is anything else.
+
+    is_whole : whether what has been read is what is expected; an error for want of a part says no
+    """
+    from fmu_build.cache import read_file  # noqa: PLC0415
+
     try:
-        whole = json.loads(place.read_text())
-        return whole["kept"] if whole["sha256"] == _digest(whole["kept"]) else None
-    except (OSError, ValueError, TypeError, KeyError):
-        return None
+        whole = json.loads((read_file(place) or b"").decode())
+        found = whole["kept"]
+        if whole["sha256"] == _digest(place, found) and is_whole(found):
+            return found
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        pass
+    return None
 
 
 def keep(place: Path, found: Any) -> None:
-    """Keeps something, as JSON takes it, beside its own digest. Raises TradeError if it cannot be written."""
-    write_whole(place, json.dumps({"sha256": _digest(found), "kept": found}).encode())
+    """Keeps something, as JSON takes it, beside a digest of it and of its place's name.
+
+    Whatever else is in that place is removed. Raises TradeError if it cannot be written.
+    """
+    from fmu_build.cache import remove  # noqa: PLC0415
+
+    if place.is_dir() and not place.is_symlink():
+        remove(place)
+    write_whole(place, json.dumps({"sha256": _digest(place, found), "kept": found}).encode())
 
 
-def _digest(found: Any) -> str:
-    return hashlib.sha256(json.dumps(found).encode()).hexdigest()
+def _digest(place: Path, found: Any) -> str:
+    return hashlib.sha256(json.dumps([place.name, found]).encode()).hexdigest()
 
 
-def _read(place: Path) -> Flown | None:
-    kept = read(place)
-    return None if kept is None else Flown(**(kept | {"samples": np.array(kept["samples"]).reshape(-1, 7)}))
+def _read(place: Path, samples: int) -> Flown | None:
+    """Returns the flight that is kept in a place, None where there is none with so many samples."""
+
+    def is_flight(kept: Any) -> bool:
+        refused, shape = kept["refused"], np.array(kept["samples"], dtype=np.float64).reshape(-1, 7).shape
+        numbers = [kept[name] for name in ("nanoseconds", "ratio", "sub_steps", "size")]
+        return (
+            kept.keys() == {field.name for field in fields(Flown)}
+            and isinstance(refused, str | None)
+            and shape[0] == (samples if refused is None else 0)
+            and all(type(row) is list and len(row) == 7 for row in kept["samples"])
+            and are_numbers([*numbers, *(value for row in kept["samples"] for value in row)])
+        )
+
+    kept = read(place, is_flight)
+    if kept is None:
+        return None
+    return Flown(**(kept | {"samples": np.array(kept["samples"], dtype=np.float64).reshape(-1, 7)}))
+
+
+def are_numbers(values: Iterable[Any]) -> bool:
+    """Whether values that JSON has given are numbers, all of them."""
+    return all(type(value) in (int, float) for value in values)
 
 
 def _keep(place: Path, flown: Flown) -> None:

@@ -1,0 +1,120 @@
+"""Temporary folders that are gone when their work is done, or when a later run comes, if it was killed.
+
+Each holds a file that its process keeps locked: where the lock is free, the process has ended.
+"""
+
+import atexit
+import functools
+import os
+import shutil
+import stat
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+
+if sys.platform == "win32":
+    import msvcrt
+else:
+    import fcntl
+
+PREFIX = "supervessel-"
+
+LOCK = ".supervessel-lock"
+
+SIGNATURE = b"supervessel: this folder is removed when the process that has locked this file has ended\n"
+"""Written once the file is locked: a file without it is being made at this moment."""
+
+LOCKED_BYTE = 1024
+"""Where the lock is: Windows keeps others from reading what is locked."""
+
+
+@contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """Yields a folder in the system's folder for temporary files, removed afterwards.
+
+    What runs that were killed have left there is removed first, once in a program. Raises OSError where no
+    folder can be made.
+    """
+    clear_left(tempfile.gettempdir())
+    folder = Path(tempfile.mkdtemp(prefix=PREFIX))
+    lock = None
+    try:
+        lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
+        if _lock(
+            lock
+        ):  # without locks, as on some network drives, the folder is never taken for a killed run's
+            os.lseek(lock, 0, os.SEEK_SET)
+            os.write(lock, SIGNATURE)
+        yield folder
+    finally:
+        if lock is not None:
+            os.close(lock)  # Windows removes no open file
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+@functools.cache
+def folder_of_program() -> Path:
+    """Returns a temporary folder that is removed when the program ends."""
+    until_the_end = ExitStack()
+    atexit.register(until_the_end.close)
+    return until_the_end.enter_context(temporary_folder())
+
+
+@functools.cache
+def clear_left(place: str) -> None:
+    """Removes the folders in a place that runs of this user's have left that were killed.
+
+    Only real folders with the lock's file in them, written as `temporary_folder` does and locked by nobody;
+    and nothing that is reached by a link.
+    """
+    with suppress(OSError), os.scandir(place) as entries:
+        for entry in entries:
+            if entry.name.startswith(PREFIX):
+                with suppress(OSError):
+                    _clear(Path(entry.path))
+
+
+def _clear(folder: Path) -> None:
+    """Removes a folder if it is left over. Raises OSError where that cannot be found out."""
+    if not is_own_folder(folder):
+        return
+    lock = os.open(folder / LOCK, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
+    try:
+        status = os.fstat(lock)
+        if not stat.S_ISREG(status.st_mode) or not is_own(status) or not _lock(lock):
+            return
+        os.lseek(lock, 0, os.SEEK_SET)
+        if os.read(lock, len(SIGNATURE) + 1) != SIGNATURE:
+            return
+    finally:
+        os.close(lock)
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def is_own_folder(path: Path) -> bool:
+    """Whether a path is a real folder, no link, that belongs to the user."""
+    try:
+        status = path.lstat()
+    except OSError:
+        return False
+    return stat.S_ISDIR(status.st_mode) and is_own(status)
+
+
+def is_own(status: os.stat_result) -> bool:
+    """Whether something belongs to the user; Windows does not say, there all does."""
+    return os.name != "posix" or status.st_uid == os.geteuid()
+
+
+def _lock(file: int) -> bool:
+    """Locks a file until it is closed, or its process ends; returns whether nobody else has locked it."""
+    try:
+        if sys.platform == "win32":
+            os.lseek(file, LOCKED_BYTE, os.SEEK_SET)
+            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
+        else:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
