@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: run test check platforms robustness stability accuracy bench slews peers clean
+.PHONY: run test check platforms robustness stability accuracy surroundings bench slews peers clean
 
 run: .venv/installed
 	$(BIN)/python -m fmu_build examples/iss_dg.toml -o build/iss_dg.fmu
@@ -29,6 +29,9 @@ stability: .venv/installed-dev
 accuracy: .venv/installed-dev
 	$(BIN)/python -m pytest -m accuracy tests/accuracy
 
+surroundings: .venv/installed-dev
+	$(BIN)/python -m pytest -m surroundings tests/surroundings
+
 bench: .venv/installed-dev
 	$(BIN)/python tests/bench/run.py
 	PYTHONPATH=tests $(BIN)/python tests/bench/costs.py
@@ -36,6 +39,7 @@ bench: .venv/installed-dev
 	PYTHONPATH=tests $(BIN)/python tests/bench/precision.py
 	$(BIN)/python tests/bench/propagators.py
 	$(BIN)/python tests/bench/from_python.py
+	PYTHONPATH=tests $(BIN)/python tests/bench/interrupts.py
 	mkdir -p build
 	$(BIN)/supervessel trade examples/iss_dg.toml --duration 6000 -o build/iss_dg_trade
 

@@ -3,12 +3,12 @@
 import signal
 import subprocess
 import sys
-import zipfile
 
 import pytest
 
-from support.processes import cache
-from support.signals import CASES, ROOT, begin, catches, end, heard, needs_linux, programs, wait_for
+from orbiter.files import Files
+from support.processes import ROOT, cache, heard
+from support.signals import CASES, WATCHDOG, begin, catches, end, needs_linux, programs, wait_for
 
 __all__ = ["cache", "heard"]
 
@@ -59,24 +59,24 @@ def test_signals_that_follow_do_not_disturb_the_end(tmp_path):
     wait_for(lambda: any("zig" in name for name in programs(running.pid)))
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGINT, signal.SIGTERM):
         running.send_signal(number)
-    out, error = running.communicate(timeout=60.0)
+    out, error = running.communicate(timeout=WATCHDOG)
     assert running.returncode in (130, 143)  # Python hears the lower number first of two at once
     assert (out, error) == ("", "interrupted\n")
     assert wait_for(lambda: not programs(running.pid), 5.0)
 
 
-def test_a_signal_that_is_ignored_at_the_start_stays_ignored(tmp_path):
+def test_a_signal_that_is_ignored_at_the_start_stays_ignored(tmp_path, heard):
     """As SIGINT is in a background job; the others end it."""
-    (tmp_path / "ball.toml").write_text("".join(CASES["build"].texts).format(mass=2.0))
-    command = f'trap "" INT; exec {sys.executable} -m fmu_build ball.toml'
-    for number, status in ((signal.SIGINT, 0), (signal.SIGTERM, 143)):
+    Files(tmp_path)
+    command = ["sh", "-c", f'trap "" INT; exec {sys.executable} -m {" ".join(CASES["import"].words)}']
+    for number, status in ((signal.SIGTERM, 143), (signal.SIGINT, 0)):
         running = subprocess.Popen(
-            ["sh", "-c", command], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
-        wait_for(lambda running=running: catches(running.pid, signal.SIGTERM))
+        wait_for(lambda running=running: catches(running.pid, signal.SIGHUP))
         assert not catches(running.pid, signal.SIGINT)
         running.send_signal(number)
-        _, error = running.communicate(timeout=60.0)
+        _, error = running.communicate(timeout=WATCHDOG)
         assert (running.returncode, error) == (status, "interrupted\n" if status else "")
 
 
@@ -94,7 +94,7 @@ def test_closed_streams_change_nothing_of_the_end(tmp_path, heard, closed):
     )
     wait_for(lambda: any("zig" in name for name in programs(running.pid)))
     running.send_signal(signal.SIGTERM)
-    out, error = running.communicate(timeout=60.0)
+    out, error = running.communicate(timeout=WATCHDOG)
     assert (running.returncode, out, error) == (143, "", "" if "2>" in closed else "interrupted\n")
     assert wait_for(lambda: not programs(running.pid), 5.0)
     assert [path.name for path in tmp_path.iterdir()] == ["ball.toml"]
@@ -104,12 +104,6 @@ def test_problems_are_not_taken_for_results_where_standard_error_is_closed(tmp_p
     command = f"exec {sys.executable} -m fmu_build none.toml 2>&-"
     done = subprocess.run(["sh", "-c", command], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (1, "")
-
-
-def test_a_build_that_is_not_told_to_end_is_whole(tmp_path):
-    ended = end(CASES["build"], tmp_path, signal.SIGTERM, 120.0)
-    assert (ended.status, ended.out, ended.error, ended.left) == (0, "ball.fmu\n", "", ["work/ball.fmu"])
-    assert zipfile.ZipFile(tmp_path / "work" / "ball.fmu").testzip() is None
 
 
 LIGHT = """\

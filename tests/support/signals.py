@@ -1,7 +1,6 @@
-"""Commands that are told by a signal to end: run in a session of their own, and looked at afterwards.
+"""Commands that a signal tells to end: run in a session of their own, and looked at afterwards.
 
-A program inherits that a signal is ignored, as SIGINT is in a background job: `heard_signals` sets what tests
-need, for their own process and for those that they start. Sessions are looked up in /proc: Linux only.
+Sessions are looked up in /proc: Linux only.
 """
 
 import os
@@ -9,8 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -18,13 +16,11 @@ from pathlib import Path
 import pytest
 
 from orbiter.files import Files
-
-ROOT = Path(__file__).parents[2]
+from support.processes import ROOT, heard_signals
 
 WATCHDOG = 120.0
 """Seconds within which anything must end that a test waits for."""
 
-needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="signals are sent as POSIX does")
 needs_linux = pytest.mark.skipif(sys.platform != "linux", reason="processes are looked up in /proc")
 
 BALL = """\
@@ -53,6 +49,25 @@ attitude = 1e-6
 horizon = 5.0
 step = 0.1
 """
+
+VESSELS = 300
+
+
+def _row() -> str:
+    lines = ['name = "row"', 'root = "V0"']
+    for i in range(VESSELS):
+        lines += [f"[vessels.V{i}]", "mass = {mass}", "pmi = [1.0, 2.0, 2.5]"]
+        for port, x in (("a", 1.0), ("b", -1.0)):
+            lines += [f"[vessels.V{i}.ports.{port}]", f"position = [{x}, 0.0, 0.0]"]
+            lines += [f"direction = [{x}, 0.0, 0.0]", "alignment = [0.0, 1.0, 0.0]"]
+    lines += [f'[[docks]]\nports = ["V{i}.a", "V{i + 1}.b"]' for i in range(VESSELS - 1)]
+    masses = [f"V{i}" for i in range(VESSELS)]
+    lines += ["[inputs]", f"mass = {masses}", f"pose = {[f'{name}.b' for name in masses[1:]]}"]
+    return "\n".join([*lines, "torque = true", ""])
+
+
+ROW = _row()
+"""Vessels in a row, every mass and pose an input."""
 
 KEPT = "interrupted; what has been flown is kept, the same command goes on from there"
 
@@ -120,27 +135,6 @@ class Ended:
     left: list[str]
 
 
-@contextmanager
-def heard_signals() -> Iterator[None]:
-    """Has signals interrupt or end this process, and programs that begin in the block, as by default."""
-    handlers = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
-    if sys.platform != "win32":
-        handlers[signal.SIGHUP] = signal.SIG_DFL
-    before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-@pytest.fixture
-def heard():
-    """`heard_signals` for a test."""
-    with heard_signals():
-        yield
-
-
 def begin(words: tuple[str, ...], folder: Path, **environment: object) -> "subprocess.Popen[str]":
     """Begins a command in a session of its own, with changes to the environment."""
     path = os.pathsep.join((str(ROOT), str(ROOT / "model")))
@@ -167,7 +161,7 @@ def wait_for(what: Callable[[], object], seconds: float = WATCHDOG) -> bool:
 
 
 def catches(process: int, number: int) -> bool:
-    """Whether a process has a handler for a signal; Python itself has one for SIGINT, ours for SIGHUP is last."""
+    """Whether a process has a handler for a signal: for SIGINT Python has one; ours for SIGHUP is last."""
     try:
         status = Path(f"/proc/{process}/status").read_text()
     except OSError:
@@ -178,7 +172,12 @@ def catches(process: int, number: int) -> bool:
 
 def programs(session: int) -> list[str]:
     """Returns the names of the programs that run in a session."""
-    names = []
+    return list(session_of(session).values())
+
+
+def session_of(session: int) -> dict[int, str]:
+    """Returns the processes that run in a session, with their names."""
+    names = {}
     for place in Path("/proc").glob("[0-9]*/stat"):
         try:
             name, _, rest = place.read_text().partition("(")[2].rpartition(")")
@@ -186,7 +185,7 @@ def programs(session: int) -> list[str]:
             continue
         state, _, _, its_session = rest.split()[:4]
         if int(its_session) == session and state not in "ZX":
-            names.append(name)
+            names[int(place.parent.name)] = name
     return names
 
 
@@ -211,7 +210,12 @@ def end(case: Case, folder: Path, number: int, delay: float, cache: Path | None 
     told = not wait_for(lambda: running.poll() is not None, delay)
     start = time.perf_counter()
     running.send_signal(number)
-    out, error = running.communicate(timeout=WATCHDOG)
+    try:
+        out, error = running.communicate(timeout=WATCHDOG)
+    except subprocess.TimeoutExpired:
+        for process in session_of(running.pid):
+            os.kill(process, signal.SIGKILL)
+        out, error = running.communicate()
     seconds = time.perf_counter() - start
     wait_for(lambda: not programs(running.pid), 5.0)
     left = [*(set(work.rglob("*")) - given), *temporary.iterdir()]

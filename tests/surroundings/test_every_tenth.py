@@ -2,14 +2,18 @@
 
 import os
 import signal
+import subprocess
+import sys
 import tempfile
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 
 import pytest
 
 from model.test_commands_end import assert_ended
-from support.signals import CASES, end, needs_linux
+from support.processes import ROOT
+from support.signals import CASES, ROW, end, needs_linux
 
 pytestmark = [pytest.mark.surroundings, needs_linux]
 
@@ -49,18 +53,38 @@ def half_written(cache):
     return found
 
 
-VESSELS = 300
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("delay", [0.5 * i for i in range(1, 9)])
+def test_equations_of_many_vessels_do_not_swallow_a_signal(tmp_path, cache, number, delay):
+    """Seconds in CasADi, which swallows exceptions."""
+    case = replace(CASES["build"], texts=(ROW,))
+    assert_ended(case, number, end(case, tmp_path, number, delay, cache))
 
 
-def wide_scene():
-    """Returns a row of vessels as a scene file, every mass and pose an input."""
-    lines = ['name = "row"', 'root = "V0"']
-    for i in range(VESSELS):
-        lines += [f"[vessels.V{i}]", "mass = 1000.0", "pmi = [1.0, 2.0, 2.5]"]
-        for port, x in (("a", 1.0), ("b", -1.0)):
-            lines += [f"[vessels.V{i}.ports.{port}]", f"position = [{x}, 0.0, 0.0]"]
-            lines += [f"direction = [{x}, 0.0, 0.0]", "alignment = [0.0, 1.0, 0.0]"]
-    lines += [f'[[docks]]\nports = ["V{i}.a", "V{i + 1}.b"]' for i in range(VESSELS - 1)]
-    masses = [f"V{i}" for i in range(VESSELS)]
-    lines += ["[inputs]", f"mass = {masses}", f"pose = {[f'{name}.b' for name in masses[1:]]}"]
-    return "\n".join([*lines, "torque = true", ""])
+MODULES = """\
+import os, sys
+import casadi, fmpy, numpy, pydantic
+for name in sys.argv[1:]:
+    child = os.fork()
+    if child == 0:
+        try:
+            __import__(name)
+            os._exit(0)
+        finally:
+            os._exit(1)
+    if os.waitpid(child, 0)[1]:
+        print(name)
+"""
+
+
+def test_every_module_can_be_imported_first():
+    """Packages import nothing by themselves that would be there before."""
+    names = []
+    for folder, package in ((ROOT / "model", "supervessel"), (ROOT, "fmu_build")):
+        files = [file.relative_to(folder).with_suffix("") for file in (folder / package).rglob("*.py")]
+        names += [".".join(file.parts).removesuffix(".__init__") for file in files]
+    assert len(names) > 90
+    done = subprocess.run(
+        [sys.executable, "-c", MODULES, *names], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
