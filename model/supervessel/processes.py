@@ -38,31 +38,42 @@ def run(
     time_limit : [s], after which it is ended; then raises subprocess.TimeoutExpired
     A program has a process group of its own, where there are any, so that what it starts ends with it.
     """
-    blocks = _blocks.get()
-    with uninterrupted():
-        if any(block.broken for block in blocks):
-            raise RuntimeError("an interrupt ends programs: no other begins")
-        process = subprocess.Popen(
-            command,
-            cwd=folder,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            encoding="utf-8",
-            errors="replace",
-            process_group=0,
-        )
-        _running[process] = blocks
-    with process:
-        try:
-            out, error = process.communicate(timeout=time_limit)
-        except BaseException:
-            _end(process)
-            raise
-        finally:
+    begun: list[subprocess.Popen[str]] = []
+    try:
+        with uninterrupted():
+            begun.append(_begin(command, folder, environment))
+        out, error = begun[0].communicate(timeout=time_limit)
+    except BaseException:
+        for process in begun:
+            with process:  # waits for it
+                _end(process)
+        raise
+    finally:
+        for process in begun:
             _running.pop(process)
-    return subprocess.CompletedProcess(command, process.returncode, out, error)
+    return subprocess.CompletedProcess(command, begun[0].returncode, out, error)
+
+
+def _begin(
+    command: Sequence[str], folder: Path | None, environment: Mapping[str, str] | None
+) -> "subprocess.Popen[str]":
+    """Returns a program that begins and is known to run in the blocks of its caller."""
+    blocks = _blocks.get()
+    if any(block.broken for block in blocks):
+        raise RuntimeError("an interrupt ends programs: no other begins")
+    process = subprocess.Popen(
+        command,
+        cwd=folder,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        encoding="utf-8",
+        errors="replace",
+        process_group=0,
+    )
+    _running[process] = blocks
+    return process
 
 
 class Workers(ThreadPoolExecutor):

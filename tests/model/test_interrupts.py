@@ -3,8 +3,8 @@
 import os
 import signal
 import sys
-import time
 from collections import deque
+from contextlib import contextmanager
 from threading import Thread, Timer
 
 import pytest
@@ -69,20 +69,24 @@ def test_an_exception_ends_programs_and_none_begins_after_it(tmp_path, error):
 @needs_posix
 def test_an_interrupt_while_a_block_waits_for_its_threads_ends_its_programs(tmp_path):
     """Most come there: a block has nothing else to do while the compiler runs."""
+    started = []
 
     def interrupted():
         with Workers(1) as pool:
-            pool.submit(sleeping, tmp_path / "begun")
+            started.append(pool.submit(sleeping, tmp_path / "begun"))
 
-    clock = Thread(
-        target=lambda: wait_for((tmp_path / "begun").exists) and os.kill(os.getpid(), signal.SIGINT)
-    )
-    clock.start()
-    start = time.monotonic()
-    with pytest.raises(KeyboardInterrupt):
+    with interrupting((tmp_path / "begun").exists), pytest.raises(KeyboardInterrupt):
         interrupted()
-    clock.join()
-    assert time.monotonic() - start < SLEEP / 2
+    assert started[0].result().returncode != 0
+
+
+@needs_posix
+def test_an_interrupt_ends_a_program_that_the_main_thread_waits_for(tmp_path):
+    begun = tmp_path / "begun"
+    with interrupting(lambda: begun.exists() and begun.read_text()), pytest.raises(KeyboardInterrupt):
+        sleeping(begun)
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(begun.read_text()), 0)
 
 
 def test_an_exception_ends_no_programs_of_other_blocks(tmp_path):
@@ -144,7 +148,19 @@ def test_a_program_that_builds_gets_the_keyboards_interrupt_and_no_compiler_is_l
 SLEEP = 600.0
 
 
+@contextmanager
+def interrupting(moment):
+    """Interrupts this process when something has come to be so."""
+    clock = Thread(target=lambda: wait_for(moment) and os.kill(os.getpid(), signal.SIGINT))
+    clock.start()
+    try:
+        yield
+    finally:
+        clock.join()
+
+
 def sleeping(begun):
-    """Runs a program that takes long and leaves a file when it has begun."""
-    program = f"import pathlib, time; pathlib.Path({str(begun)!r}).touch(); time.sleep({SLEEP})"
+    """Runs a program that takes long and leaves its number in a file when it has begun."""
+    note = f"pathlib.Path({str(begun)!r}).write_text(str(os.getpid()))"
+    program = f"import os, pathlib, time; {note}; time.sleep({SLEEP})"
     return run([sys.executable, "-c", program], SLEEP)
