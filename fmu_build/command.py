@@ -5,15 +5,16 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from fmu_build.build import build_fmu
-from fmu_build.errors import BuildError
 from fmu_build.platforms import PLATFORMS, Platform, platforms_named
-from supervessel import Scene, SceneError, choose, load_scene
-from supervessel.accuracy import said
 from supervessel.console import print_results, show_progress
 from supervessel.ending import say
-from supervessel.trade import TradeError
+
+if TYPE_CHECKING:
+    from supervessel import Scene
+
+# What takes time to import is imported where it is needed: help and wrong usage need none of it.
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -47,6 +48,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _build(options: argparse.Namespace, platforms: Sequence[Platform]) -> int:
     """Builds what the options ask for; returns the exit status."""
+    from fmu_build.build import build_fmu
+    from fmu_build.errors import BuildError
+    from supervessel import SceneError, load_scene
+    from supervessel.trade import TradeError
+
     try:
         scene = load_scene(options.scene)
         output = options.output or Path(f"{scene.name}.fmu")
@@ -63,8 +69,10 @@ def _build(options: argparse.Namespace, platforms: Sequence[Platform]) -> int:
     return print_results("\n".join([*chosen, str(output)]), "the FMU is built, its path")
 
 
-def _choose(scene: Scene) -> list[str]:
+def _choose(scene: "Scene") -> list[str]:
     """Returns what `[accuracy]` chooses, in a line; shows how far that is."""
+    from supervessel.accuracy import choose, said
+
     say("; what has been flown is kept, the same command goes on from there")
     _, evidence = choose(scene, lambda what: show_progress(f"accuracy: {what}"))
     show_progress("accuracy: ")

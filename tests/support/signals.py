@@ -82,12 +82,14 @@ class Case:
     texts  : of a scene, one after the other; none: the small scenario of Orbiter
     made   : what the command leaves in the working folder when it is not told to end
     lines  : with which it may end
+    mass   : of the scene's vessel [kg]; None: another one in each run, of which nothing is in a cache
     """
 
     words: tuple[str, ...]
     texts: tuple[str, ...]
     made: tuple[str, ...]
     lines: tuple[str, ...] = ("interrupted",)
+    mass: float | None = None
 
 
 CASES = {
@@ -194,13 +196,12 @@ def end(case: Case, folder: Path, number: int, delay: float, cache: Path | None 
 
     folder : a new one
     cache  : of the command; None: that of the tests
-    The scene is another one in each call: nothing of it is in a cache.
     """
     work, temporary = folder / "work", folder / "temporary"
     work.mkdir(parents=True)
     temporary.mkdir()
     if case.texts:
-        (work / "ball.toml").write_text("".join(case.texts).format(mass=next(_masses) / 1e3))
+        (work / "ball.toml").write_text("".join(case.texts).format(mass=case.mass or next(_masses) / 1e3))
     else:
         Files(work)
     given = set(work.rglob("*"))
