@@ -1,81 +1,20 @@
-"""Command line: python -m fmu_build SCENE.toml [-o OUT.fmu] [--fmi 2|3] [--platform NAME ...|all]."""
+"""Command line: python -m fmu_build SCENE.toml [...]; what it does is in `command`.
 
-import argparse
+Nothing is imported here that takes time: a signal must find its handler.
+"""
+
 import sys
 from collections.abc import Sequence
-from importlib.metadata import version
-from pathlib import Path
 
-from fmu_build.build import build_fmu
-from fmu_build.errors import BuildError
-from fmu_build.platforms import PLATFORMS, Platform, platforms_named
-from supervessel import Scene, SceneError, choose, load_scene
-from supervessel.accuracy import said
-from supervessel.console import Parser, print_results, show_progress
-from supervessel.interrupts import interrupted_once
-from supervessel.problems import printable
-from supervessel.trade import TradeError
+from supervessel.ending import run_as_process
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Builds the FMU of a scene file; returns 0 when done, 1 when it failed, each problem on stderr."""
-    parser = Parser(
-        prog="python -m fmu_build",
-        description="Build the FMU of a scene: its path on stdout, before it in "
-        "a line what [accuracy] has chosen.",
-    )
-    parser.add_argument("--version", action="version", version=version("supervessel"))
-    parser.add_argument("scene", type=Path, metavar="SCENE.toml", help="the scene file")
-    parser.add_argument(
-        "-o", "--output", type=Path, metavar="OUT.fmu", help="the FMU to write (default: NAME.fmu here)"
-    )
-    parser.add_argument("--fmi", type=int, choices=(2, 3), default=3, help="FMI version (default: 3)")
-    parser.add_argument(
-        "--platform",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="NAME",
-        help=f"to compile for (default: this machine's): {', '.join(p.name for p in PLATFORMS)}; or all",
-    )
-    options = parser.parse_args(arguments)
-    try:
-        platforms = platforms_named(options.platform)
-    except ValueError as error:
-        parser.error(f"--platform: {error}")
-    with interrupted_once():
-        return _build(options, platforms)
+    from fmu_build import command  # noqa: PLC0415
 
-
-def _build(options: argparse.Namespace, platforms: Sequence[Platform]) -> int:
-    """Builds what the options ask for; returns the exit status."""
-    try:
-        scene = load_scene(options.scene)
-        output = options.output or Path(f"{scene.name}.fmu")
-        if output.resolve() == options.scene.resolve():
-            raise BuildError(
-                f"{printable(str(output))}: is the scene file itself; the FMU needs a name of its own"
-            )
-        chosen = _choose(scene) if scene.accuracy else []
-        build_fmu(scene, output, options.fmi, platforms)
-    except (SceneError, BuildError) as error:
-        print(error, file=sys.stderr)
-        return 1
-    except TradeError as error:
-        print(f"{printable(options.scene.name)}: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("interrupted; no FMU was written", file=sys.stderr)
-        return 1
-    return print_results("\n".join([*chosen, str(output)]), "the FMU is built, its path")
-
-
-def _choose(scene: Scene) -> list[str]:
-    """Returns what `[accuracy]` chooses, in a line; shows how far that is."""
-    _, evidence = choose(scene, lambda what: show_progress(f"accuracy: {what}"))
-    show_progress("accuracy: ")
-    return [said(evidence)]
+    return command.main(arguments)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_as_process(main))

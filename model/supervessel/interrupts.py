@@ -1,18 +1,24 @@
-"""Interrupts that are not lost: CasADi swallows some while expressions are made; and that come once only."""
+"""Pieces of work that signals do not cut in two, in commands and in programs that use this package."""
 
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import current_thread, main_thread
 from types import FrameType
+
+from supervessel import ending
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 @contextmanager
 def interrupt_afterwards() -> Iterator[None]:
-    """Has signals that would interrupt a block wait for its end; other threads never get one."""
-    before = {number: handler for number in SIGNALS if callable(handler := signal.getsignal(number))}
+    """Has signals that would raise an exception in a block wait for its end: CasADi swallows some of these.
+
+    Other threads never get one. The handler of our commands raises nothing, so it need not wait.
+    """
+    handlers = {number: signal.getsignal(number) for number in SIGNALS}
+    before = {n: handler for n, handler in handlers.items() if callable(handler) and handler != ending.tell}
     if current_thread() is not main_thread():
         yield
         return
@@ -30,29 +36,26 @@ def interrupt_afterwards() -> Iterator[None]:
 
 
 @contextmanager
-def interrupted_once() -> Iterator[None]:
-    """Has SIGTERM interrupt a program's main block as the keyboard does, with KeyboardInterrupt.
+def uninterrupted() -> Iterator[None]:
+    """Has every signal wait for the end of a block, the end of a command too: short pieces of work only.
 
-    From the first one on all others are ignored: the program ends, and nothing shall disturb that. A signal
-    that is ignored already stays so. Once interrupted they stay ignored: Python's own end takes some time.
+    What begins in the block and is unfinished without its end: a program that is started and must be known,
+    files that come into place together. No two threads are in such blocks at the same time.
     """
-    if current_thread() is not main_thread():
-        yield
-        return
+    with interrupt_afterwards():
+        ending.enter_block()
+        try:
+            yield
+        finally:
+            ending.leave_block()
 
-    heard: list[int] = []
 
-    def interrupt(number: int, _frame: FrameType | None) -> None:
-        if not heard:
-            heard.append(number)
-            raise KeyboardInterrupt
-
-    handlers = {number: signal.getsignal(number) for number in SIGNALS}
-    before = {n: handler for n, handler in handlers.items() if handler not in (signal.SIG_IGN, None)}
-    for number in before:
-        signal.signal(number, interrupt)
+@contextmanager
+def finally_done(act: Callable[[], object]) -> Iterator[None]:
+    """Calls a function after a block, also when a signal ends the command in it. It must raise nothing."""
+    ending.before_end.append(act)
     try:
         yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, signal.SIG_IGN if heard else handler)
+        act()
+        ending.before_end.remove(act)

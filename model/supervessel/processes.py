@@ -3,16 +3,28 @@
 import os
 import signal
 import subprocess
-from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
+from contextvars import ContextVar, copy_context
+from functools import partial
 from pathlib import Path
-from threading import Event, Lock
 from types import TracebackType
+from typing import ParamSpec, Self, TypeVar
 
-_running: set["subprocess.Popen[str]"] = set()
-_starting = Lock()
-_interrupted = Event()
+from supervessel import ending
+from supervessel.interrupts import uninterrupted
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+GRACE = 0.2  # s; a program that is killed takes milliseconds to be gone
+
+_running: dict["subprocess.Popen[str]", tuple["Workers", ...]] = {}
+"""Programs, each with the blocks of workers that it is run in."""
+
+_blocks: ContextVar[tuple["Workers", ...]] = ContextVar("blocks", default=())
 
 
 def run(
@@ -26,34 +38,61 @@ def run(
     time_limit : [s], after which it is ended; then raises subprocess.TimeoutExpired
     A program has a process group of its own, where there are any, so that what it starts ends with it.
     """
-    with _starting:
-        if _interrupted.is_set():
-            raise RuntimeError("an interrupt ends programs: no other begins")
-        process = subprocess.Popen(
-            command,
-            cwd=folder,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            encoding="utf-8",
-            errors="replace",
-            process_group=0,
-        )
-        _running.add(process)
-    with process:
-        try:
-            out, error = process.communicate(timeout=time_limit)
-        except BaseException:
-            _end(process)
-            raise
-        finally:
-            _running.discard(process)
-    return subprocess.CompletedProcess(command, process.returncode, out, error)
+    begun: list[subprocess.Popen[str]] = []
+    try:
+        with uninterrupted():
+            begun.append(_begin(command, folder, environment))
+        out, error = begun[0].communicate(timeout=time_limit)
+    except BaseException:
+        for process in begun:
+            with process:  # waits for it
+                _end(process)
+        raise
+    finally:
+        for process in begun:
+            _running.pop(process)
+    return subprocess.CompletedProcess(command, begun[0].returncode, out, error)
+
+
+def _begin(
+    command: Sequence[str], folder: Path | None, environment: Mapping[str, str] | None
+) -> "subprocess.Popen[str]":
+    """Returns a program that begins and is known to run in the blocks of its caller."""
+    blocks = _blocks.get()
+    if any(block.broken for block in blocks):
+        raise RuntimeError("an interrupt ends programs: no other begins")
+    process = subprocess.Popen(
+        command,
+        cwd=folder,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        encoding="utf-8",
+        errors="replace",
+        process_group=0,
+    )
+    _running[process] = blocks
+    return process
 
 
 class Workers(ThreadPoolExecutor):
-    """Threads that wait for programs; an interrupt ends these, no other begins until the block is over."""
+    """Threads that wait for programs.
+
+    An exception that leaves the block, or comes while it waits for its threads, ends all programs that are
+    run in it, also in blocks within; no other begins there. It need not be KeyboardInterrupt: CasADi makes
+    other exceptions of one. What threads outside of the block run goes on.
+    """
+
+    broken = False
+
+    def __enter__(self) -> Self:
+        self._outside = _blocks.set((*_blocks.get(), self))
+        return self
+
+    def submit(self, function: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """Has a thread call a function, as one within the blocks of the caller."""
+        return super().submit(copy_context().run, partial(function, *args, **kwargs))
 
     def __exit__(
         self,
@@ -62,17 +101,25 @@ class Workers(ThreadPoolExecutor):
         trace: TracebackType | None,
     ) -> None:
         """Waits for what has begun; nothing else begins."""
-        if kind is None or issubclass(kind, Exception):
-            self.shutdown(cancel_futures=True)
-            return
-        with _starting:
-            _interrupted.set()
-            for process in tuple(_running):
-                _end(process)
         try:
-            self.shutdown(cancel_futures=True)
+            if kind is None:
+                self.shutdown(cancel_futures=True)
+                return
+        except BaseException:
+            self._break()
+            raise
         finally:
-            _interrupted.clear()
+            _blocks.reset(self._outside)
+        self._break()
+
+    def _break(self) -> None:
+        """Ends the programs of the block and waits for its threads."""
+        with uninterrupted():
+            self.broken = True
+            for process, blocks in tuple(_running.items()):
+                if self in blocks:
+                    _end(process)
+        self.shutdown(cancel_futures=True)
 
 
 def _end(process: "subprocess.Popen[str]") -> None:
@@ -82,3 +129,16 @@ def _end(process: "subprocess.Popen[str]") -> None:
             os.killpg(process.pid, signal.SIGKILL)
     else:
         process.kill()
+
+
+def _end_all() -> None:
+    """Ends every program; returns when they are gone."""
+    programs = tuple(_running)
+    for process in programs:
+        _end(process)
+    late = time.monotonic() + GRACE
+    while any(process.poll() is None for process in programs) and time.monotonic() < late:
+        time.sleep(0.002)
+
+
+ending.before_end.append(_end_all)

@@ -10,6 +10,7 @@ from supervessel.scene import without_accuracy
 from supervessel.trade.choices import Choice, Model, variant_of
 from support import ISS_DG, variant
 from support.processes import interrupted, needs_posix, run
+from support.signals import KEPT
 
 ACCURACY = {"attitude": 1e-4, "rate": 1e-6, "horizon": 600.0, "step": 0.1}
 SCENE = variant(
@@ -135,7 +136,7 @@ def command(limit=""):
 def test_an_interrupt_keeps_whole_results_and_leaves_no_fmu(tmp_path, cache):
     (tmp_path / "ball.toml").write_text(TEXT)
     done, kept = interrupted(command(), tmp_path, cache, "accuracy")
-    assert (done.returncode, done.stdout, done.stderr) == (1, "", "interrupted; no FMU was written\n")
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", f"{KEPT}\n")
     assert [path.name for path in tmp_path.iterdir()] == ["ball.toml"]
     assert kept
     assert all(json.loads(content).get("refused") is None for content in kept.values())

@@ -1,36 +1,24 @@
-"""Interrupts: none is lost while equations are made, and what they end leaves nothing behind."""
+"""Interrupts of programs: none is lost while equations are made, and what they end leaves nothing behind."""
 
 import os
 import signal
-import subprocess
 import sys
-import time
 from collections import deque
-from pathlib import Path
-from threading import Timer
+from contextlib import contextmanager
+from threading import Thread, Timer
 
 import pytest
 
 from supervessel.equations import equations
-from supervessel.interrupts import interrupt_afterwards, interrupted_once
+from supervessel.interrupts import uninterrupted
 from supervessel.processes import Workers, run
 from support import ISS_DG, scene
+from support.processes import heard, needs_posix
+from support.signals import BALL, WATCHDOG, begin, needs_linux, programs, wait_for
 
-ROOT = Path(__file__).parents[2]
+__all__ = ["heard"]
 
-SCENE = """\
-name = "ball"
-root = "B"
-[vessels.B]
-mass = 2.0
-pmi = [1.0, 1.5, 2.0]
-[experiment]
-duration = 10.0
-step = 1.0
-"""
-
-needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="signals are sent as POSIX does")
-needs_linux = pytest.mark.skipif(sys.platform != "linux", reason="processes are looked up in /proc")
+pytestmark = pytest.mark.usefixtures("heard")
 
 
 @needs_posix
@@ -46,47 +34,31 @@ def test_an_interrupt_while_equations_are_made_is_not_lost(delay):
 
 
 @needs_posix
-def test_the_first_signal_interrupts_and_later_ones_do_not_disturb_the_end():
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    heard = []
+def test_signals_wait_for_the_end_of_an_uninterrupted_block():
+    done = []
 
-    def terminated():
-        with interrupted_once(), interrupt_afterwards():
-            os.kill(os.getpid(), signal.SIGTERM)
-            heard.append("waited")
+    def interrupted():
+        with uninterrupted(), uninterrupted():
+            os.kill(os.getpid(), signal.SIGINT)
+            done.append("whole")
 
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            terminated()
-        assert heard == ["waited"]
-        for number in before:
-            os.kill(os.getpid(), number)
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert done == ["whole"]
 
 
-@needs_posix
-def test_without_a_signal_all_is_as_it_was():
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    with interrupted_once():
-        assert signal.getsignal(signal.SIGTERM) is not before[signal.SIGTERM]
-    assert {number: signal.getsignal(number) for number in before} == before
-
-
-def test_an_interrupt_ends_programs_and_none_begins_after_it(tmp_path):
-    begun = tmp_path / "begun"
-    program = f"import pathlib, time; pathlib.Path({str(begun)!r}).touch(); time.sleep(600)"
+@pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
+def test_an_exception_ends_programs_and_none_begins_after_it(tmp_path, error):
+    """CasADi makes other exceptions of KeyboardInterrupt."""
     started = []
 
     def interrupted():
         with Workers(1) as pool:
-            started.extend(pool.submit(run, [sys.executable, "-c", program], 600.0) for _ in range(2))
-            while not begun.exists():
-                time.sleep(0.01)
-            raise KeyboardInterrupt
+            started.extend(pool.submit(sleeping, tmp_path / "begun") for _ in range(2))
+            wait_for((tmp_path / "begun").exists)
+            raise error
 
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(error):
         interrupted()
     first, second = started
     assert first.result().returncode != 0
@@ -94,55 +66,101 @@ def test_an_interrupt_ends_programs_and_none_begins_after_it(tmp_path):
     assert run([sys.executable, "-c", "print('on')"], 60.0).stdout == "on\n"
 
 
+@needs_posix
+def test_an_interrupt_while_a_block_waits_for_its_threads_ends_its_programs(tmp_path):
+    """Most come there: a block has nothing else to do while the compiler runs."""
+    started = []
+
+    def interrupted():
+        with Workers(1) as pool:
+            started.append(pool.submit(sleeping, tmp_path / "begun"))
+
+    with interrupting((tmp_path / "begun").exists), pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert started[0].result().returncode != 0
+
+
+@needs_posix
+def test_an_interrupt_ends_a_program_that_the_main_thread_waits_for(tmp_path):
+    begun = tmp_path / "begun"
+    with interrupting(lambda: begun.exists() and begun.read_text()), pytest.raises(KeyboardInterrupt):
+        sleeping(begun)
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(begun.read_text()), 0)
+
+
+def test_an_exception_ends_no_programs_of_other_blocks(tmp_path):
+    """Those of blocks within its own it does end."""
+    within, over = [], tmp_path / "over"
+    waiting = (
+        "import pathlib, time\n"
+        f"while not pathlib.Path({str(over)!r}).exists(): time.sleep(0.01)\n"
+        "print('whole')\n"
+    )
+
+    def nested():
+        with Workers(1) as inner:
+            within.append(inner.submit(sleeping, tmp_path / "within"))
+
+    def failed():
+        with Workers(1) as pool:
+            pool.submit(nested)
+            wait_for((tmp_path / "within").exists)
+            raise RuntimeError
+
+    with Workers(1) as other:
+        apart = other.submit(run, [sys.executable, "-c", waiting], WATCHDOG)
+        with pytest.raises(RuntimeError):
+            failed()
+        assert within[0].result().returncode != 0
+        over.touch()
+        assert apart.result().stdout == "whole\n"
+
+
+LIBRARY = """\
+from fmu_build import build_fmu
+from fmu_build.platforms import PLATFORMS
+from supervessel import load_scene
+try:
+    build_fmu(load_scene("ball.toml"), "ball.fmu", platforms=PLATFORMS)
+except KeyboardInterrupt:
+    print("heard")
+"""
+
+
 @needs_linux
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (
-            ["supervessel", "trade", "ball.toml"],
-            "interrupted; what has been flown is kept, the same command goes on from there",
-        ),
-        (["fmu_build", "ball.toml"], "interrupted; no FMU was written"),
-    ],
-    ids=["trade", "build"],
-)
-def test_a_command_that_is_terminated_leaves_nothing_behind(tmp_path, words, message):
-    """While the compiler runs; Ctrl-C twice right after it changes nothing."""
+def test_a_program_that_builds_gets_the_keyboards_interrupt_and_no_compiler_is_left(tmp_path):
     work, temporary = tmp_path / "work", tmp_path / "temporary"
     work.mkdir()
     temporary.mkdir()
-    (work / "ball.toml").write_text(SCENE)
-    folders = {"SUPERVESSEL_CACHE": str(tmp_path / "cache"), "TMPDIR": str(temporary)}
-    running = subprocess.Popen(
-        [sys.executable, "-m", *words],
-        cwd=work,
-        env=os.environ | folders | {"PYTHONPATH": os.pathsep.join((str(ROOT), str(ROOT / "model")))},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    while running.poll() is None and not any("zig" in name for name in programs(running.pid)):
-        time.sleep(0.01)
-    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGINT):
-        running.send_signal(number)
-        time.sleep(0.01)
-    out, error = running.communicate()
-    assert (running.returncode, out, error.strip()) == (1, "", message)
-    assert programs(running.pid) == []
+    (work / "ball.toml").write_text(BALL.format(mass=1.25))
+    (work / "program.py").write_text(LIBRARY)
+    running = begin(("program",), work, TMPDIR=temporary)
+    wait_for(lambda: running.poll() is not None or any("zig" in name for name in programs(running.pid)))
+    running.send_signal(signal.SIGINT)
+    out, error = running.communicate(timeout=WATCHDOG)
+    assert (running.returncode, out, error) == (0, "heard\n", "")
+    assert wait_for(lambda: not programs(running.pid), 5.0)
     assert list(temporary.iterdir()) == []
-    assert [path.name for path in work.iterdir()] == ["ball.toml"]
+    assert not list(work.glob("*.fmu"))
 
 
-def programs(session):
-    """Returns the names of the programs that run in a session."""
-    names = []
-    for place in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            name, _, rest = place.read_text().partition("(")[2].rpartition(")")
-        except OSError:  # it has just ended
-            continue
-        state, _, _, its_session = rest.split()[:4]
-        if int(its_session) == session and state != "Z":
-            names.append(name)
-    return names
+SLEEP = 600.0
+
+
+@contextmanager
+def interrupting(moment):
+    """Interrupts this process when something has come to be so."""
+    clock = Thread(target=lambda: wait_for(moment) and os.kill(os.getpid(), signal.SIGINT))
+    clock.start()
+    try:
+        yield
+    finally:
+        clock.join()
+
+
+def sleeping(begun):
+    """Runs a program that takes long and leaves its number in a file when it has begun."""
+    note = f"pathlib.Path({str(begun)!r}).write_text(str(os.getpid()))"
+    program = f"import os, pathlib, time; {note}; time.sleep({SLEEP})"
+    return run([sys.executable, "-c", program], SLEEP)

@@ -1,11 +1,17 @@
-"""Commands run as a user runs them, with a cache of the tests' own."""
+"""Commands run as a user runs them, with a cache of the tests' own.
+
+A program inherits that a signal is ignored, as SIGINT is in a background job: `heard_signals` sets what tests
+need, for their own process and for programs that they start.
+"""
 
 import os
 import signal
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -15,6 +21,27 @@ from fmu_build.cache import OURS, cache_folder
 ROOT = Path(__file__).parents[2]
 
 needs_posix = pytest.mark.skipif(os.name != "posix", reason="needs signals and ulimit")
+
+
+@contextmanager
+def heard_signals() -> Iterator[None]:
+    """Has signals interrupt or end this process, and programs that begin in the block, as by default."""
+    handlers = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+    if sys.platform != "win32":
+        handlers[signal.SIGHUP] = signal.SIG_DFL
+    before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@pytest.fixture
+def heard():
+    """`heard_signals` for a test."""
+    with heard_signals():
+        yield
 
 
 COMPILERS = ("b", "h", "o", "tmp", "z", "sources")
@@ -60,14 +87,15 @@ def interrupted(
     """
     generation = kept_in(cache)
     before = set(generation.glob(f"{kind}/*"))
-    running = subprocess.Popen(
-        command,
-        cwd=folder,
-        env=_environment(cache),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    with heard_signals():
+        running = subprocess.Popen(
+            command,
+            cwd=folder,
+            env=_environment(cache),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
     while running.poll() is None and not set(generation.glob(f"{kind}/*.json")) - before:
         time.sleep(0.02)
     running.send_signal(signal.SIGINT)

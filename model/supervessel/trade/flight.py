@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supervessel.equations import Equations, equations
+from supervessel.interrupts import uninterrupted
 from supervessel.problems import printable
 from supervessel.processes import Workers, run
 from supervessel.scene import Scene
@@ -442,6 +443,7 @@ def write_whole(file: Path, content: bytes) -> None:
     write_all(file.parent, {file.name: content})
 
 
+@uninterrupted()
 def write_all(folder: Path, files: Mapping[str, bytes]) -> None:
     """Writes files into a folder, made if need be; none appears before all are whole. Raises TradeError."""
     parts: dict[str, Path] = {}
