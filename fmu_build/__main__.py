@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 
-from fmu_build.build import build_fmu
+from fmu_build.build import build_fmu, check_fmu_output
 from fmu_build.errors import BuildError
 from fmu_build.platforms import PLATFORMS, Platform, platforms_named
 from supervessel import Scene, SceneError, choose, load_scene
@@ -51,8 +51,7 @@ def _build(options: argparse.Namespace, platforms: Sequence[Platform]) -> int:
     try:
         scene = load_scene(options.scene)
         output = options.output or Path(f"{scene.name}.fmu")
-        if output.resolve() == options.scene.resolve():
-            raise BuildError(f"{output}: is the scene file itself; the FMU needs a name of its own")
+        check_fmu_output(output, [options.scene])
         chosen = _choose(scene) if scene.accuracy else []
         build_fmu(scene, output, options.fmi, platforms)
     except (SceneError, BuildError) as error:
