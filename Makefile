@@ -2,7 +2,17 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: run test check platforms robustness stability accuracy surroundings bench slews peers clean
+# What is installed is the same next month: exact versions, for the tested Python; another takes the newest.
+CONSTRAINTS := -c tests/constraints.txt --build-constraint tests/constraints.txt
+PIP := pip --disable-pip-version-check
+
+# The part of the suite that the lowest versions of pyproject.toml pass: the model, the twin, FMUs built and flown.
+LOWEST := tests/model tests/orbiter tests/build/test_build.py tests/build/test_scene.py tests/build/test_scene_errors.py \
+  tests/fmu/test_simulation.py tests/fmu/test_model_description.py tests/fmu/test_model_exchange.py \
+  tests/twin/test_twin.py tests/twin/test_error_state.py tests/trade/test_trade.py \
+  tests/examples/test_lqr_hold.py tests/examples/test_identify.py
+
+.PHONY: run test check lowest constraints platforms robustness stability accuracy surroundings bench slews peers clean
 
 run: .venv/installed
 	$(BIN)/python -m fmu_build examples/iss_dg.toml -o build/iss_dg.fmu
@@ -15,6 +25,28 @@ check: .venv/installed-dev
 	$(BIN)/ruff format --check model fmu_build tests examples
 	$(BIN)/ruff check model fmu_build tests examples
 	$(BIN)/mypy
+
+lowest: .venv-lowest/installed
+	.venv-lowest/bin/python -m pytest -n auto --dist worksteal $(LOWEST)
+
+# Renews tests/constraints.txt, the newest of everything, and from it the list of what the package brings along.
+constraints:
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || \
+	  { echo "tests/constraints.txt is for Python 3.11: make PYTHON=python3.11 constraints" >&2; exit 1; }
+	rm -rf .venv-newest .venv-runtime
+	$(PYTHON) -m venv .venv-newest
+	.venv-newest/bin/python -m pip install --quiet --upgrade 'pip>=25.3'
+	.venv-newest/bin/python -m $(PIP) install --quiet --editable '.[examples]' --group dev editables
+	{ echo "# Versions that are tested, by make constraints; other versions of Python take the newest."; \
+	  .venv-newest/bin/python -m $(PIP) freeze --all --exclude-editable | sed 's/$$/ ; python_version == "3.11"/'; \
+	} > tests/constraints.txt
+	.venv-newest/bin/python -m $(PIP) install --quiet 'cyclonedx-bom>=7,<8'
+	$(PYTHON) -m venv --without-pip .venv-runtime
+	.venv-newest/bin/python -m $(PIP) --python .venv-runtime/bin/python install --quiet $(CONSTRAINTS) .
+	.venv-newest/bin/cyclonedx-py environment --output-reproducible --pyproject pyproject.toml --mc-type library \
+	  .venv-runtime/bin/python > .venv-runtime/sbom.json
+	.venv-newest/bin/python tests/supply/sbom.py .venv-runtime/sbom.json > model/supervessel.cdx.json
+	rm -rf .venv-newest .venv-runtime
 
 platforms: .venv/installed-dev
 	$(BIN)/python -m pytest -m platforms tests/platforms
@@ -54,19 +86,26 @@ peers: .venv-peers/installed
 	PYTHONPATH=tests:tests/bench .venv-peers/bin/python tests/peers/composites.py
 
 clean:
-	rm -rf .venv .venv-peers build .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-* build .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
-.venv/installed: pyproject.toml
+.venv/installed: pyproject.toml tests/constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "Python >= 3.11 is needed, $(PYTHON) is older: make PYTHON=python3.12 ..." >&2; exit 1; }
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
-	$(BIN)/python -m pip install --quiet --editable '.[examples]'
+	$(BIN)/python -m pip install --quiet --upgrade -c tests/constraints.txt 'pip>=25.3'
+	$(BIN)/python -m $(PIP) install --quiet $(CONSTRAINTS) --editable '.[examples]'
 	mkdir -p build
 	touch $@
 
 .venv/installed-dev: .venv/installed
-	$(BIN)/python -m pip install --quiet --group dev
+	$(BIN)/python -m $(PIP) install --quiet $(CONSTRAINTS) --group dev
+	touch $@
+
+.venv-lowest/installed: pyproject.toml tests/lowest.txt
+	$(PYTHON) -m venv .venv-lowest
+	.venv-lowest/bin/python -m pip install --quiet --upgrade 'pip>=25.3'
+	.venv-lowest/bin/python -m $(PIP) install --quiet -c tests/lowest.txt --editable '.[examples]' \
+	  pytest pytest-xdist hypothesis mpmath
 	touch $@
 
 .venv-peers/installed: pyproject.toml

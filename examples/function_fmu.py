@@ -3,6 +3,7 @@
 The C around the generated function is in function_fmu/; what no such FMU supports is taken from fmu_build/c/.
 """
 
+import io
 import tempfile
 import zipfile
 from collections.abc import Mapping
@@ -17,6 +18,7 @@ from fmu_build.codegen import digest
 from fmu_build.compiler import compile_library
 from fmu_build.platforms import host_platform
 from fmu_build.sources import LAYER
+from supervessel.files import write_file
 from supervessel.problems import unknown
 
 OWN = Path(__file__).parent / "function_fmu"
@@ -118,7 +120,9 @@ def build_function_fmu(
         (folder / "function.h").write_text(header(function, known, token))
         library = folder / f"{name}{platform.suffix}"
         compile_library([Path(file.name) for file in folder.glob("*.c")], platform, library, folder=folder)
-        with zipfile.ZipFile(output, "w", zipfile.ZIP_DEFLATED) as archive:
+        packed = io.BytesIO()
+        with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
             archive.writestr("modelDescription.xml", description(name, known, token, fmi))
             archive.write(library, f"binaries/{platform.folder(fmi)}/{library.name}")
+    write_file(output, packed.getvalue())
     return output

@@ -6,6 +6,7 @@ Writes iss_dg.csv (every output at every step), iss_dg_inertia.png, iss_dg_rotat
 prints the table.
 """
 
+import io
 import sys
 import tomllib
 from pathlib import Path
@@ -19,6 +20,7 @@ from fmpy import simulate_fmu
 
 from fmu_build import build_fmu
 from supervessel import parse_scene
+from supervessel.files import write_files
 
 EXAMPLES = Path(__file__).parent
 DURATION, STEP = 600.0, 0.1  # s
@@ -106,8 +108,8 @@ def table(tensor_law: np.ndarray, apart: np.ndarray) -> str:
     return "\n".join(lines)
 
 
-def plot(panels: list[tuple[str, np.ndarray, list[str]]], t: np.ndarray, file: Path) -> None:
-    """Draws one panel below the other: axis label, curves (n, k), names of the curves."""
+def plot(panels: list[tuple[str, np.ndarray, list[str]]], t: np.ndarray) -> bytes:
+    """Returns a PNG of panels below each other: axis label, curves (n, k), names of the curves."""
     figure, axes = plt.subplots(len(panels), 1, figsize=(8.0, 2.4 * len(panels)), sharex=True)
     for ax, (label, curves, names) in zip(axes, panels, strict=True):
         ax.plot(t, curves, label=names)
@@ -116,8 +118,10 @@ def plot(panels: list[tuple[str, np.ndarray, list[str]]], t: np.ndarray, file: P
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize="small")
     axes[-1].set_xlabel("time [s]")
     figure.tight_layout()
-    figure.savefig(file, dpi=120)
+    drawn = io.BytesIO()
+    figure.savefig(drawn, dpi=120)
     plt.close(figure)
+    return drawn.getvalue()
 
 
 def main(folder: Path) -> None:
@@ -129,8 +133,9 @@ def main(folder: Path) -> None:
     apart = turned_apart(group(tensor_law, "attitude", 4), group(principal_law, "attitude", 4))
 
     names = tensor_law.dtype.names
+    rows = io.BytesIO()
     np.savetxt(
-        folder / "iss_dg.csv",
+        rows,
         np.column_stack([tensor_law[name] for name in names]),
         delimiter=",",
         header=",".join(f'"{name}"' for name in names),
@@ -139,26 +144,24 @@ def main(folder: Path) -> None:
     )
     t, xyz = tensor_law["time"], ["x", "y", "z"]
     pmi = group(tensor_law, "pmi", 3)
-    plot(
+    inertia = plot(
         [
             ("PMI, change [m2]", pmi - pmi[0], xyz),
             ("barycentre [m]", group(tensor_law, "barycentre", 3), xyz),
             ("mass [t]", tensor_law["mass"][:, None] / 1000.0, ["ISS + DG"]),
         ],
         t,
-        folder / "iss_dg_inertia.png",
     )
-    plot(
+    rotation = plot(
         [
             ("rate [deg/s]", np.degrees(group(tensor_law, "angular_velocity", 3)), xyz),
             ("attitude", group(tensor_law, "attitude", 4), ["w", *xyz]),
             ("law principal off [deg]", apart[:, None], ["against tensor"]),
         ],
         t,
-        folder / "iss_dg_rotation.png",
     )
     results = table(tensor_law, apart)
-    (folder / "iss_dg.md").write_text(
+    report = (
         "# ISS with a DeltaGlider, ten minutes\n\n"
         "Fuel burns from 60 to 360 s, the docking port of the ship is moved from 400 to 460 s, torque\n"
         "pulses act about x (30-50, 200-220 s) and z (100-120, 500-520 s). Law `tensor`; the last column is\n"
@@ -166,6 +169,14 @@ def main(folder: Path) -> None:
         f"{results}\n\n"
         "![PMI, barycentre, mass](iss_dg_inertia.png)\n\n![rates, attitude, drift](iss_dg_rotation.png)\n\n"
         "Every output at every step: `iss_dg.csv`.\n"
+    )
+    write_files(
+        {
+            folder / "iss_dg.csv": rows.getvalue(),
+            folder / "iss_dg_inertia.png": inertia,
+            folder / "iss_dg_rotation.png": rotation,
+            folder / "iss_dg.md": report.encode(),
+        }
     )
     print(results)
 

@@ -1,9 +1,9 @@
 """From a scene to a packed FMU."""
 
+import io
 import json
-import tempfile
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from fmu_build.table import Entry, variable_table
 from fmu_build.terminals import terminals_and_icons
 from supervessel.accuracy import choose
 from supervessel.equations import Equations, equations
+from supervessel.files import OutputError, check_output, write_file
 from supervessel.problems import printable
 from supervessel.processes import Workers
 from supervessel.scene import Scene
@@ -42,7 +43,8 @@ def build_fmu(scene: Scene, output: str | Path, fmi: int = 3, platforms: Sequenc
     """Builds the FMU of a scene and returns its path.
 
     scene     : from `load_scene`
-    output    : the file to write; its folder must be there. An old one is replaced once the new is whole.
+    output    : the file to write; its folder must be there. An old FMU is replaced once the new is whole;
+                anything else that is there, and is not empty, is refused (see `supervessel.files`)
     fmi       : version of the FMI standard, 2 or 3
     platforms : to compile for, of `fmu_build.platforms.PLATFORMS`; none: this machine's
     A scene with `[accuracy]` is built as `supervessel.choose` finds it; the evidence is in the archive.
@@ -57,7 +59,7 @@ def build_fmu(scene: Scene, output: str | Path, fmi: int = 3, platforms: Sequenc
     if fmi not in (2, 3):
         raise ValueError(f"fmi = {fmi}: must be 2 or 3")
     output = Path(output)
-    _check_output(output)
+    check_fmu_output(output)
     platforms = platforms or (host_platform(),)
     scene, evidence = _chosen(scene)
     model = equations(scene)
@@ -69,7 +71,7 @@ def build_fmu(scene: Scene, output: str | Path, fmi: int = 3, platforms: Sequenc
         binaries = aside.submit(compile_sources, packed, names, fmi, platforms, scene.name)
         beside = companions(scene, model, entries, fmi, evidence)
     content = {"modelDescription.xml": description, **packed, **binaries.result(), **beside}
-    _write_archive(content, output)
+    write_archive(content, output)
     return output
 
 
@@ -160,36 +162,38 @@ def compile_sources(  # noqa: PLR0913, PLR0917
     return compile_binaries([WHOLE], folder, platforms, fmi, identifier, flags)
 
 
-def _check_output(output: Path) -> None:
-    """Raises BuildError, before any work is done, where the archive could not be written."""
+def check_fmu_output(output: Path, inputs: Iterable[Path] = ()) -> None:
+    """Raises BuildError, before any work is done, where an FMU cannot be written.
+
+    A file that is there, holds something and is no FMU may be named by mistake: it is not replaced.
+    inputs : files that are read for it
+    """
     try:
-        if output.is_dir():
-            raise BuildError(f"{printable(str(output))}: is a folder; the FMU needs a file name")
-    except OSError as error:
-        raise BuildError(f"{printable(str(output))}: cannot be written: {error.strerror}") from None
-    try:
-        with tempfile.TemporaryFile(dir=output.parent):
-            pass
-    except OSError as error:
-        shown, parent = printable(str(output)), printable(str(output.parent))
-        raise BuildError(f"{shown}: cannot be written: {error.strerror}: {parent}") from None
+        if check_output(output, inputs) and not _is_fmu(output):
+            raise OutputError(output, "is there already and is no FMU; remove it or take another name")
+    except OutputError as error:
+        raise BuildError(str(error)) from None
 
 
-def _write_archive(content: Mapping[str, bytes], output: Path) -> None:
-    """Writes a zip archive with the same bytes for the same content; the file appears when it is whole."""
-    part = None
+def _is_fmu(file: Path) -> bool:
+    """Whether a file is an archive with a model description."""
     try:
-        with tempfile.NamedTemporaryFile(dir=output.parent, prefix=".fmu-", delete=False) as stream:
-            part = Path(stream.name)
-            with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
-                for name in sorted(content):
-                    info = zipfile.ZipInfo(name, ARCHIVE_TIME)
-                    info.compress_type = zipfile.ZIP_DEFLATED
-                    info.external_attr = 0o644 << 16
-                    archive.writestr(info, content[name])
-        part.chmod(0o644)
-        part.replace(output)
-    except OSError as error:
-        if part is not None:
-            part.unlink(missing_ok=True)
-        raise BuildError(f"{printable(str(output))}: cannot be written: {error.strerror}") from None
+        with zipfile.ZipFile(file) as archive:
+            return "modelDescription.xml" in archive.namelist()
+    except (OSError, ValueError, NotImplementedError, zipfile.BadZipFile):
+        return False
+
+
+def write_archive(content: Mapping[str, bytes], output: Path) -> None:
+    """Writes a zip archive with the same bytes for the same content. Raises BuildError if it cannot."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in sorted(content):
+            info = zipfile.ZipInfo(name, ARCHIVE_TIME)
+            info.compress_type = zipfile.ZIP_DEFLATED
+            info.external_attr = 0o644 << 16
+            archive.writestr(info, content[name])
+    try:
+        write_file(output, packed.getvalue())
+    except OutputError as error:
+        raise BuildError(str(error)) from None

@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _build(options: argparse.Namespace, platforms: Sequence[Platform]) -> int:
     """Builds what the options ask for; returns the exit status."""
-    from fmu_build.build import build_fmu
+    from fmu_build.build import build_fmu, check_fmu_output
     from fmu_build.errors import BuildError
     from supervessel import SceneError, load_scene
     from supervessel.trade import TradeError
@@ -57,10 +57,7 @@ def _build(options: argparse.Namespace, platforms: Sequence[Platform]) -> int:
     try:
         scene = load_scene(options.scene)
         output = options.output or Path(f"{scene.name}.fmu")
-        if output.resolve() == options.scene.resolve():
-            raise BuildError(
-                f"{printable(str(output))}: is the scene file itself; the FMU needs a name of its own"
-            )
+        check_fmu_output(output, [options.scene])
         chosen = _choose(scene) if scene.accuracy else []
         build_fmu(scene, output, options.fmi, platforms)
     except (SceneError, BuildError) as error:

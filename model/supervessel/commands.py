@@ -1,6 +1,6 @@
 """The subcommands of supervessel.
 
-supervessel import FILE.scn [...] -o SCENE.toml
+supervessel import FILE.scn [...] -o SCENE.toml [--force]
 supervessel trade SCENE.toml [-o FOLDER] [--quick] [--duration S]
 supervessel cache [--clear]
 """
@@ -8,21 +8,22 @@ supervessel cache [--clear]
 import argparse
 import json
 import sys
-import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import get_args
 
 from supervessel.console import Parser, print_results, show_progress
 from supervessel.ending import say
-from supervessel.interrupts import finally_done
+from supervessel.files import OutputError, check_output, made_folder, write_file, write_files
 from supervessel.loading import load_scene, parse_scene
 from supervessel.orbiter import ScenarioError, import_scenario
 from supervessel.problems import SceneError, first, printable
 from supervessel.scene import Convention, Scene, without_accuracy
-from supervessel.trade import TradeError, course_of, plot, study, table, write_all
+from supervessel.trade import TradeError, course_of, is_trade, plot, study, table
+
+TRADE_FILES = ("json", "md", "png", "svg")
+"""Kinds of the files that a trade leaves, trade.KIND each; the first tells that they are a trade's."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -66,30 +67,26 @@ def _add_import(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="SCENE.toml", help="the scene file to write"
     )
+    parser.add_argument(
+        "--force", action="store_true", help="replace a file that is there already (default: refused)"
+    )
     parser.set_defaults(run=_import)
 
 
 def _import(options: argparse.Namespace) -> int:
     output: Path = options.output
     try:
+        if check_output(output, [options.scenario, *filter(None, [options.table])]) and not options.force:
+            raise OutputError(output, "is there already; --force replaces it")
         made = import_scenario(
             options.scenario, options.vessel, options.config, options.table, options.convention
         )
-    except ScenarioError as error:
+        check_output(output, made.sources)
+        for note in first(made.notes, "notes, all of them at the head of the scene"):
+            print(f"note: {note}", file=sys.stderr)
+        write_file(output, made.text.encode())
+    except (ScenarioError, OutputError) as error:
         print(error, file=sys.stderr)
-        return 1
-    if output.resolve() in [path.resolve() for path in made.sources]:
-        print(
-            f"{printable(str(output))}: is one of the files read; the scene needs a file of its own",
-            file=sys.stderr,
-        )
-        return 1
-    for note in first(made.notes, "notes, all of them at the head of the scene"):
-        print(f"note: {note}", file=sys.stderr)
-    try:
-        _write(made.text, output)
-    except OSError as error:
-        print(f"{printable(str(output))}: cannot be written: {error.strerror}", file=sys.stderr)
         return 1
     return print_results(str(output), "the scene is written, its path")
 
@@ -120,18 +117,19 @@ def _trade(options: argparse.Namespace) -> int:
         scene = _lasting(without_accuracy(load_scene(options.scene)), options.duration)
         folder: Path = options.output or Path(f"{scene.name}_trade")
         course_of(scene)
-        with _made(folder):
+        with made_folder(folder):
+            _check_trade_files(folder, options.scene)
             found = study(scene, quick=options.quick, progress=_progress)
             tables = table(found)
-            files = {"trade.json": json.dumps(found, indent=1).encode(), "trade.md": f"{tables}\n".encode()}
+            files = {"json": json.dumps(found, indent=1).encode(), "md": f"{tables}\n".encode()}
             try:
-                files |= {f"trade.{kind}": drawn for kind, drawn in plot(found).items()}
+                files |= plot(found)
             except ImportError:
                 print(
                     "no plot: matplotlib is not installed, pip install 'supervessel[plot]'", file=sys.stderr
                 )
-            write_all(folder, files)
-    except (SceneError, BuildError) as error:
+            write_files({folder / f"trade.{kind}": content for kind, content in files.items()})
+    except (SceneError, BuildError, OutputError) as error:
         print(error, file=sys.stderr)
         return 1
     except TradeError as error:
@@ -158,19 +156,15 @@ def _cache(options: argparse.Namespace) -> int:
     return print_results(said, "the cache's content")
 
 
-@contextmanager
-def _made(folder: Path) -> Iterator[None]:
-    """Makes a folder, unless it is there; takes it away again if nothing comes into it."""
-    there = folder.exists()
+def _check_trade_files(folder: Path, scene: Path) -> None:
+    """Raises OutputError, before any work is done, where a trade's files cannot be written.
 
-    def clear() -> None:
-        if not there:
-            with suppress(OSError):  # there is something in it
-                folder.rmdir()
-
-    with finally_done(clear):
-        write_all(folder, {})
-        yield
+    Nor may they replace what is of no trade: files of their names without trade.json, or another's.
+    """
+    files = [folder / f"trade.{kind}" for kind in TRADE_FILES]
+    there = [file for file in files if check_output(file, [scene])]
+    if there and not is_trade(folder / "trade.json"):
+        raise OutputError(there[0], "is there already and is of no trade; remove it or take another folder")
 
 
 def _lasting(scene: Scene, duration: float | None) -> Scene:
@@ -186,19 +180,3 @@ def _progress(done: int, total: int, what: str) -> None:
     """Shows how far a trade has come."""
     bar = "#" * (24 * done // total)
     show_progress(f"[{bar:.<24}] {done}/{total} {what}", "\n" if done == total else "")
-
-
-def _write(text: str, output: Path) -> None:
-    """Writes a file, which appears when it is whole."""
-    if output.is_dir():
-        raise IsADirectoryError(0, "is a folder")
-    with tempfile.NamedTemporaryFile(dir=output.parent, prefix=".scene-", delete=False) as stream:
-        part = Path(stream.name)
-        try:
-            stream.write(text.encode())
-            stream.close()
-            part.chmod(0o644)
-            part.replace(output)
-        except BaseException:
-            part.unlink(missing_ok=True)
-            raise

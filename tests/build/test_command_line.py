@@ -5,6 +5,7 @@ import hashlib
 import os
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -139,7 +140,7 @@ LONG = "x" * 249 + ".fmu"
             "ball.toml/my.fmu",
             f"ball.toml/my.fmu: cannot be written: {os.strerror(errno.ENOTDIR)}: ball.toml",
         ),
-        (".", ".: is a folder; the FMU needs a file name"),
+        (".", ".: cannot be written: is a folder, not a regular file"),
         (LONG + "xxxx", f"{LONG}xxxx: cannot be written: {os.strerror(errno.ENAMETOOLONG)}"),
     ],
     ids=["no folder", "below a file", "a folder", "name too long"],
@@ -212,6 +213,13 @@ def test_a_compiler_that_fails_is_quoted_on_stderr(folder, tmp_path_factory):
     assert (done.returncode, done.stdout, files(folder)) == (1, "", ["ball.toml"])
 
 
+def an_fmu(file):
+    """Writes an archive that is taken for an old FMU; returns its bytes."""
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("modelDescription.xml", "<fmiModelDescription/>")
+    return file.read_bytes()
+
+
 def failing(tmp_path_factory):
     """Returns a PYTHONPATH by which the compiler is one that fails."""
     folder = fake_compiler(tmp_path_factory.mktemp("failing"), "echo 'error: no disk, no ink' >&2; exit 1")
@@ -222,7 +230,7 @@ def failing(tmp_path_factory):
 @pytest.mark.parametrize("reason", ["the scene", "the compiler", "the compiler's cache"])
 def test_an_old_fmu_survives_a_build_that_fails(folder, reason, tmp_path_factory):
     output = folder / "ball.fmu"
-    output.write_bytes(b"old")
+    old = an_fmu(output)
     environment = {}
     if reason == "the scene":
         (folder / "ball.toml").write_text(BROKEN)
@@ -233,11 +241,11 @@ def test_an_old_fmu_survives_a_build_that_fails(folder, reason, tmp_path_factory
     before = files(folder)
     done = run(folder, "ball.toml", **environment)
     assert "Traceback" not in done.stderr
-    assert (done.returncode, output.read_bytes(), files(folder)) == (1, b"old", before)
+    assert (done.returncode, output.read_bytes(), files(folder)) == (1, old, before)
 
 
 def test_a_build_replaces_an_old_fmu(folder):
-    (folder / "ball.fmu").write_bytes(b"old")
+    an_fmu(folder / "ball.fmu")
     assert run(folder, "ball.toml").returncode == 0
     assert files(folder) == ["ball.fmu", "ball.toml"]
     assert read_model_description(str(folder / "ball.fmu")).modelName == "ball"
@@ -304,4 +312,4 @@ def test_the_scene_file_is_never_overwritten_by_its_fmu(folder):
     before = scene.read_bytes()
     done = run(folder, "ball.toml", "-o", "../" + folder.name + "/ball.toml")
     assert (done.returncode, scene.read_bytes()) == (1, before)
-    assert "is the scene file itself" in done.stderr
+    assert "cannot be written: is a file that is read for it: ball.toml" in done.stderr

@@ -375,7 +375,7 @@ def test_the_command_says_on_stderr_what_was_missing(files):
 def test_a_failure_names_every_problem_and_leaves_an_old_scene_alone(files):
     (files.folder / "side.toml").write_text("old")
     files.replace(files.scenario, ("0:0.25", "0:25"), ("30.00", "thirty"))
-    done = run(files, *GIVEN)
+    done = run(files, *GIVEN, "--force")
     assert (done.returncode, done.stdout) == (1, "")
     assert [line.partition(" ")[0] for line in done.stderr.splitlines()] == ["side.scn:18:", "side.scn:16:"]
     assert (files.folder / "side.toml").read_text() == "old"
@@ -390,14 +390,14 @@ def test_a_failure_names_every_problem_and_leaves_an_old_scene_alone(files):
 @pytest.mark.parametrize(
     ("output", "message"),
     [
-        ("side.scn", "side.scn: is one of the files read; the scene needs a file of its own"),
-        ("code.toml", "code.toml: is one of the files read; the scene needs a file of its own"),
+        ("side.scn", "side.scn: cannot be written: is a file that is read for it: side.scn"),
+        ("code.toml", "code.toml: cannot be written: is a file that is read for it: code.toml"),
         (
             "Config/../Config/Vessels/Hub.cfg",
-            "Config/../Config/Vessels/Hub.cfg: is one of the files read; the scene needs a file of its own",
+            "Config/../Config/Vessels/Hub.cfg: cannot be written: is there already; --force replaces it",
         ),
-        ("none/side.toml", f"none/side.toml: cannot be written: {os.strerror(errno.ENOENT)}"),
-        (".", ".: cannot be written: is a folder"),
+        ("none/side.toml", f"none/side.toml: cannot be written: {os.strerror(errno.ENOENT)}: none"),
+        (".", ".: cannot be written: is a folder, not a regular file"),
     ],
 )
 def test_an_output_that_cannot_be_is_refused(files, output, message):

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -99,7 +100,7 @@ def test_a_full_disk_leaves_the_old_files_as_they_are(finished, cache):
     limited = f"ulimit -f 8 && exec {' '.join(command('ball.toml', '--quick', '-o', 'out'))}"
     done = run(["sh", "-c", limited], folder, cache)
     assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr == "ball.toml: out: cannot be written: File too large\n"
+    assert done.stderr == f"{Path('out/trade.json')}: cannot be written: File too large\n"
     assert {path.name: path.read_bytes() for path in (folder / "out").iterdir()} == before
 
 
@@ -108,7 +109,7 @@ def test_a_full_disk_leaves_no_new_folder(finished, cache):
     _, folder = finished
     limited = f"ulimit -f 8 && exec {' '.join(command('ball.toml', '--quick', '-o', 'new'))}"
     done = run(["sh", "-c", limited], folder, cache)
-    assert done.stderr == "ball.toml: new: cannot be written: File too large\n"
+    assert done.stderr == f"{Path('new/trade.json')}: cannot be written: File too large\n"
     assert not (folder / "new").exists()
 
 
@@ -145,7 +146,7 @@ def test_a_full_disk_leaves_no_new_folder(finished, cache):
             ("", ""),
             ("-o", "ball.toml/out"),
             1,
-            "ball.toml: ball.toml/out: cannot be written: Not a directory\n",
+            "ball.toml/out: cannot be written: Not a directory\n",
         ),
     ],
 )

@@ -7,9 +7,13 @@ from pathlib import Path
 
 import casadi as ca
 
+from supervessel.files import OutputError, check_output, write_file
 from supervessel.scene import Scene
 
 DERIVATIVES = (0, 1, 2)
+
+GENERATED = b"CASADI_CODEGEN_PREFIX"
+"""A word that stands in all C that CasADi generates."""
 
 COMMUNICATION_STEP = "communication_step"
 """The CasADi function in the C file of that name, here, which joins an FMU's C."""
@@ -24,17 +28,29 @@ def generate(
     What calls another library, such as `communication_step`, cannot be compiled: BuildError names that call.
     The library's name holds a digest of the source: what is there already is not compiled again, and what a
     running program has loaded is never overwritten.
-    Raises BuildError if the compiler fails.
+    Raises BuildError if the compiler fails, NAME.c cannot be written, or is there and not CasADi's.
     """
     if derivatives not in DERIVATIVES:
         raise ValueError(f"generate: derivatives = {derivatives!r}: must be 0, 1 or 2")
     source = _source(functions, f"{name}.c", derivatives)
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / f"{name}.c").write_text(source)
+    _write_source(source, folder / f"{name}.c")
     # CasADi hands 0 on for a pointer to nothing where an argument is empty.
     flags = ("-fvisibility=default", "-Wno-int-conversion")
     library = _compiled({f"{name}.c": source.encode()}, f"{name}.c", folder, name, flags)
     return [ca.external(function.name(), library) for function in functions]
+
+
+def _write_source(source: str, file: Path) -> None:
+    """Writes generated C. Raises BuildError if it cannot be written or would replace what is none."""
+    from fmu_build.errors import BuildError  # noqa: PLC0415
+
+    file.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        if check_output(file) and GENERATED not in file.read_bytes():
+            raise OutputError(file, "is there already and is not CasADi's; remove it or take another folder")
+        write_file(file, source.encode())
+    except OutputError as error:
+        raise BuildError(str(error)) from None
 
 
 def communication_step(scene: Scene, folder: Path) -> ca.Function:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supervessel.equations import Equations, equations
-from supervessel.interrupts import uninterrupted
+from supervessel.files import OutputError, write_file
 from supervessel.problems import printable
 from supervessel.processes import Workers, run
 from supervessel.scene import Scene
@@ -440,24 +440,10 @@ def _keep(place: Path, flown: Flown) -> None:
 
 def write_whole(file: Path, content: bytes) -> None:
     """Writes a file, which appears when it is whole. Raises TradeError if it cannot be written."""
-    write_all(file.parent, {file.name: content})
-
-
-@uninterrupted()
-def write_all(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Writes files into a folder, made if need be; none appears before all are whole. Raises TradeError."""
-    parts: dict[str, Path] = {}
     try:
-        folder.mkdir(exist_ok=True)
-        for name, content in files.items():
-            with tempfile.NamedTemporaryFile(dir=folder, prefix=".trade-", delete=False) as stream:
-                parts[name] = Path(stream.name)
-                stream.write(content)
-            parts[name].chmod(0o644)
-        for name, part in parts.items():
-            part.replace(folder / name)
+        file.parent.mkdir(exist_ok=True)
+        write_file(file, content)
+    except OutputError as error:
+        raise TradeError(str(error)) from None
     except OSError as error:
-        raise TradeError(f"{printable(str(folder))}: cannot be written: {error.strerror}") from None
-    finally:
-        for part in parts.values():
-            part.unlink(missing_ok=True)
+        raise TradeError(f"{printable(str(file.parent))}: cannot be written: {error.strerror}") from None

@@ -1,9 +1,11 @@
 """The trade: references, errors apart, what is the same taken together, and the Pareto front."""
 
+import json
 import platform
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -135,6 +137,15 @@ def study(scene: Scene, *, quick: bool = False, progress: Progress = lambda *_: 
             if result.refused is not None
         ],
     }
+
+
+def is_trade(file: Path) -> bool:
+    """Whether a file is a trade, as trade.json holds it."""
+    try:
+        found = json.loads(file.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return False
+    return isinstance(found, dict) and {"about", "scene", "models", "choices"} <= found.keys()
 
 
 class _Count:
