@@ -60,7 +60,8 @@ static bool derives_ordinary(Instance *instance, const double seed[], size_t cou
     const double *s = &instance->now.values[REFERENCE_ATTITUDE_START];
     const bool at_start = instance->now.state & BEFORE_START;
     const bool long_enough = fmax(fmax(fabs(s[0]), fabs(s[1])), fmax(fabs(s[2]), fabs(s[3]))) >= 0x1p-150;
-    const bool scaled = memcmp(instance->now.p, &instance->now.values[REFERENCE_P], INPUT_P_COUNT * sizeof(double)) != 0;
+    const double *p = instance->now.p, *set = &instance->now.values[REFERENCE_P];
+    const bool scaled = memcmp(p, set, INPUT_P_COUNT * sizeof(double)) != 0;
     return instance_is_ordinary(instance) && are_ordinary(seed, count) && !scaled &&
            (!at_start || (are_ordinary(s, 4) && long_enough));
 }

@@ -32,8 +32,9 @@ static size_t not_shown(const char *text) {
     if (c[0] < 0x20 || c[0] == 0x7F || c[0] == '%') return 1;
     if ((c[0] == 0xC2 && c[1] >= 0x80 && c[1] <= 0x9F) || (c[0] == 0xD8 && c[1] == 0x9C)) return 2;
     if (c[0] != 0xE2 || (c[1] != 0x80 && c[1] != 0x81)) return 0;
-    const bool shown = c[1] == 0x80 ? c[2] < 0x8E || (c[2] > 0x8F && c[2] < 0xA8) || c[2] > 0xAE : c[2] < 0xA6 || c[2] > 0xA9;
-    return shown ? 0 : 3;
+    const bool mark = c[2] == 0x8E || c[2] == 0x8F || (c[2] >= 0xA8 && c[2] <= 0xAE);
+    const bool isolate = c[2] >= 0xA6 && c[2] <= 0xA9;
+    return (c[1] == 0x80 ? mark : isolate) ? 3 : 0;
 }
 
 void instance_print(const char *text, char shown[PRINT_SIZE]) {

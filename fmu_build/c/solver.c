@@ -245,7 +245,8 @@ static Status sub_step(Instance *instance, Progress *progress) {
         const double found = series.error[0] + series.error[1] * reach;
         const double rounding = rounding_of(found, series.error, speed);
         const double allowed = larger(SAFETY * instance->now.tolerance * (size / progress->h), rounding);
-        const double best = found > NO_ERROR * allowed ? pow(AIM * allowed / found, 1.0 / series.order) : MOST_GROWTH;
+        const bool seen = found > NO_ERROR * allowed;
+        const double best = seen ? pow(AIM * allowed / found, 1.0 / series.order) : MOST_GROWTH;
         double taken = size, next[STATE_COUNT];
         if (!(found <= allowed)) taken = without_rest(progress, best * size);
         else if (best > 1.0 && 2.0 * LONGEST_SHARE * size < progress->remaining)

@@ -95,7 +95,7 @@ def principal_forward(moments: ca.SX, rotation: ca.SX, d_inertia: ca.SX) -> tupl
 
 
 def _gap(difference: ca.SX, largest: ca.SX) -> ca.SX:
-    """Returns the difference of two moments; for none a number that changes of about the largest may be divided by."""
+    """Returns the difference of two moments, or, where there is none, a small number to divide by."""
     return ca.if_else(difference == 0.0, ca.fmax(LEAST_SHARE * largest, LEAST), difference)
 
 

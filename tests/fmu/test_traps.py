@@ -1,6 +1,7 @@
 """Hosts that trap floating-point exceptions: no call that succeeds raises one but underflow or inexact.
 
-`support.Instance` watches every call of every test; here are the cases that did raise one, and a host that traps.
+`support.Instance` watches every call of every test. Here are the cases that raised one, and a host that
+traps.
 """
 
 import platform

@@ -238,7 +238,7 @@ def _means(A: ca.SX, B: ca.SX, A_less_B: ca.SX, start: Pair, rise: ca.SX) -> tup
 
 
 def _mean(a: ca.SX, b: ca.SX, difference: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Returns arithmetic and geometric mean of two numbers, from these and a - b, and the means' difference."""
+    """Returns the arithmetic and the geometric mean of a and b, and their difference, from a - b."""
     mean, other = 0.5 * (a + b), ca.sqrt(a * b)
     return mean, other, _square(0.5 * difference) / (mean + other)
 
