@@ -319,8 +319,9 @@ static Status sub_step(Instance *instance, Progress *progress) {
         const bool usable = is_finite(next) && isfinite(found);
         if (usable && found <= allowed) {
             go_on(instance, progress, next, size, found + HALF_ULP * (1.0 + speed * size));
+            if (progress->remaining == 0.0) return STATUS_OK;
             const double best = found > NO_ERROR * allowed ? 0.9 * pow(allowed / found, power) : MOST_GROWTH;
-            if (progress->remaining > 0.0) progress->next_size = size * fmin(MOST_GROWTH, best);
+            progress->next_size = size * fmin(MOST_GROWTH, best);
             return STATUS_OK;
         }
         progress->next_size = size * (usable ? larger(0.2, 0.9 * pow(allowed / found, power)) : 0.2);

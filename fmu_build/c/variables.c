@@ -51,8 +51,8 @@ bool are_ordinary(const double numbers[], size_t count) {
 }
 
 bool instance_is_ordinary(Instance *instance) {
-    return instance->now.composite_is_ordinary && are_ordinary(instance_states(instance), STATE_COUNT) &&
-           are_ordinary(instance_x(instance), STATE_COUNT) &&
+    return instance->now.composite_is_ordinary && are_ordinary(instance_x(instance), STATE_COUNT) &&
+           (!STATE_IS_MOMENTUM || are_ordinary(instance_states(instance), STATE_COUNT)) &&
            are_ordinary(&instance->now.values[REFERENCE_TORQUE], INPUT_U_COUNT);
 }
 
