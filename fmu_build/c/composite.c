@@ -46,7 +46,8 @@ static Status check_pmi(Instance *instance, const Variable *variable, const doub
     if (small < 0.0)
         return instance_refuse(instance, "%.*s = (%.10g, %.10g, %.10g) m2: must be >= 0", group_length(variable),
                                variable->name, k[0], k[1], k[2]);
-    const double excess = large - (small + middle);
+    const double scale = large > 0x1p1000 ? 0.5 : 1.0; /* the sum of two may be no double */
+    const double excess = (scale * large - (scale * small + scale * middle)) / scale;
     if (!TRIANGLE_JUDGED || excess <= TRIANGLE_SLACK * large) return STATUS_OK;
     char text[3][NUMBER_SIZE];
     return instance_refuse(instance,
@@ -174,6 +175,14 @@ Status composite_between(Instance *instance, const double p[], double c[]) {
 
 #endif
 
+/* Whether products of a few numbers of inputs and composite, and quotients by mass and moments, are doubles. */
+static bool makes_ordinary(const double p[], const double c[]) {
+    static const double least = 0x1p-150;
+    bool ordinary = are_ordinary(p, INPUT_P_COUNT) && are_ordinary(c, COMPOSITE_COUNT) && c[COMPOSITE_MASS] >= least;
+    for (size_t i = COMPOSITE_MARGINS; i < COMPOSITE_LAW && LAW_TURNS; i++) ordinary = ordinary && c[i] >= least;
+    return ordinary;
+}
+
 /* p and c become current. */
 static Status adopt(Instance *instance, const double p[], const double c[]) {
 #if CHANGES
@@ -204,6 +213,7 @@ Status composite_refresh(Instance *instance) {
     if (status == STATUS_OK) status = adopt(instance, p, c);
     if (status != STATUS_OK) return status;
     now->composite_is_current = true;
+    now->composite_is_ordinary = makes_ordinary(now->p, now->c);
     now->axes_are_current = false;
     instance->outputs_are_current = instance->rates_are_current = false;
     instance_inform(instance, LOG_COMPOSITE, "composite computed at %.10g s: mass = %.10g kg",

@@ -55,6 +55,17 @@ static Status check_request(Instance *instance, const unsigned unknowns[], size_
     return status;
 }
 
+/* Whether all that derivatives are made of, the seeds included, surely is within the range of doubles. */
+static bool derives_ordinary(Instance *instance, const double seed[], size_t count) {
+    const double *s = &instance->now.values[REFERENCE_ATTITUDE_START];
+    const bool at_start = instance->now.state & BEFORE_START;
+    const bool long_enough = fmax(fmax(fabs(s[0]), fabs(s[1])), fmax(fabs(s[2]), fabs(s[3]))) >= 0x1p-150;
+    const double *p = instance->now.p, *set = &instance->now.values[REFERENCE_P];
+    const bool scaled = memcmp(p, set, INPUT_P_COUNT * sizeof(double)) != 0;
+    return instance_is_ordinary(instance) && are_ordinary(seed, count) && !scaled &&
+           (!at_start || (are_ordinary(s, 4) && long_enough));
+}
+
 /* Applies the derivative of q = s/|s| to a vector in place; it is symmetric, so it serves both ways. */
 static void project_attitude_start(Instance *instance, double v[4]) {
     const double *q = instance_x(instance), *s = &instance->now.values[REFERENCE_ATTITUDE_START];
@@ -88,8 +99,8 @@ static bool rate_follows(const Instance *instance) {
 
 #endif
 
-/* From changes of x, u, c to changes of rate and y. */
-static void respond(Instance *instance) {
+/* From changes of x, u, c to changes of rate and y. ordinary: as of instance_call. */
+static void respond(Instance *instance, bool ordinary) {
     Variation *v = &instance->variation;
     instance_set_state_arguments(instance);
     instance->arg[4] = v->x;
@@ -97,7 +108,7 @@ static void respond(Instance *instance) {
     instance->arg[6] = v->c;
     instance->res[0] = v->rate;
     instance->res[1] = v->y;
-    response_forward(instance->arg, instance->res, instance->iw, instance->w, 0);
+    instance_call(instance, response_forward, ordinary);
 }
 
 /* Refuses derivatives that leave the range of doubles. */
@@ -109,11 +120,9 @@ static Status check_results(Instance *instance, const unsigned references[], siz
     return STATUS_OK;
 }
 
-Status derivatives_forward(Instance *instance, const unsigned unknowns[], size_t unknown_count,
-                           const unsigned knowns[], size_t known_count, const double seed[], double sensitivity[]) {
-    Status status = check_request(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity,
-                                  known_count, unknown_count);
-    if (status != STATUS_OK) return status;
+static Status forward(Instance *instance, const unsigned unknowns[], size_t unknown_count, const unsigned knowns[],
+                      size_t known_count, const double seed[], double sensitivity[]) {
+    Status status = STATUS_OK;
     Variation *v = &instance->variation;
     memset(v, 0, sizeof *v);
     bool shape_changes = false;
@@ -137,16 +146,27 @@ Status derivatives_forward(Instance *instance, const unsigned unknowns[], size_t
     if (shape_changes && rate_follows(instance)) status = changes_forward(instance, v);
     if (status != STATUS_OK) return status;
 #endif
-    respond(instance);
+    respond(instance, true);
     for (size_t i = 0; i < unknown_count; i++) sensitivity[i] = *place(v, unknowns[i]);
-    return check_results(instance, unknowns, unknown_count, sensitivity);
+    return status;
 }
 
-Status derivatives_adjoint(Instance *instance, const unsigned unknowns[], size_t unknown_count,
+Status derivatives_forward(Instance *instance, const unsigned unknowns[], size_t unknown_count,
                            const unsigned knowns[], size_t known_count, const double seed[], double sensitivity[]) {
     Status status = check_request(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity,
-                                  unknown_count, known_count);
+                                  known_count, unknown_count);
     if (status != STATUS_OK) return status;
+    fenv_t importers;
+    const bool ordinary = derives_ordinary(instance, seed, known_count);
+    if (!ordinary) feholdexcept(&importers); /* see instance_call */
+    status = forward(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity);
+    if (!ordinary) fesetenv(&importers);
+    return status == STATUS_OK ? check_results(instance, unknowns, unknown_count, sensitivity) : status;
+}
+
+static Status adjoint(Instance *instance, const unsigned unknowns[], size_t unknown_count, const unsigned knowns[],
+                      size_t known_count, const double seed[], double sensitivity[]) {
+    Status status = STATUS_OK;
     Variation *v = &instance->variation;
     double on_states[STATE_COUNT];
     memset(v, 0, sizeof *v);
@@ -179,7 +199,20 @@ Status derivatives_adjoint(Instance *instance, const unsigned unknowns[], size_t
         const double *weight = place(v, knowns[i]);
         sensitivity[i] = weight ? *weight : 0.0;
     }
-    return check_results(instance, knowns, known_count, sensitivity);
+    return status;
+}
+
+Status derivatives_adjoint(Instance *instance, const unsigned unknowns[], size_t unknown_count,
+                           const unsigned knowns[], size_t known_count, const double seed[], double sensitivity[]) {
+    Status status = check_request(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity,
+                                  unknown_count, known_count);
+    if (status != STATUS_OK) return status;
+    fenv_t importers;
+    const bool ordinary = derives_ordinary(instance, seed, unknown_count);
+    if (!ordinary) feholdexcept(&importers);
+    status = adjoint(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity);
+    if (!ordinary) fesetenv(&importers);
+    return status == STATUS_OK ? check_results(instance, knowns, known_count, sensitivity) : status;
 }
 
 Status derivatives_of_time(Instance *instance, const unsigned references[], size_t count, const int orders[],
@@ -199,7 +232,7 @@ Status derivatives_of_time(Instance *instance, const unsigned references[], size
     if (status != STATUS_OK) return status;
     composite_refresh_axes(instance);
     memset(v->c, 0, sizeof v->c);
-    respond(instance);
+    respond(instance, instance_is_ordinary(instance) && are_ordinary(v->x, STATE_COUNT));
     for (size_t i = 0; i < count; i++) values[i] = v->y[references[i] - REFERENCE_OUTPUTS];
     return check_results(instance, references, count, values);
 }

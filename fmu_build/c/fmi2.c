@@ -67,8 +67,10 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String token, 
     const char *problem = instantiation_problem(name, type, token);
     Instance *instance = problem ? NULL : instance_new(name, type == fmi2ModelExchange);
     if (!instance) {
+        char shown[PRINT_SIZE];
+        instance_print(name ? name : "", shown);
         if (functions && functions->logger)
-            functions->logger(functions->componentEnvironment, name ? name : "", fmi2Error, "logStatusError",
+            functions->logger(functions->componentEnvironment, shown, fmi2Error, "logStatusError",
                               problem ? problem : "fmi2Instantiate: out of memory");
         return NULL;
     }

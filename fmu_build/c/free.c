@@ -108,6 +108,10 @@ static Status free_piece(Instance *instance, double x[], double *time, bool whol
     return STATUS_OK;
 }
 
+static bool is_at_rest(const double x[]) {
+    return x[4] == 0.0 && x[5] == 0.0 && x[6] == 0.0;
+}
+
 bool free_reaches(const double x[], double time) {
     const double a = x[4] * time, b = x[5] * time, c = x[6] * time;
     return a * a + b * b + c * c <= LARGEST_TURN * LARGEST_TURN;
@@ -122,7 +126,7 @@ Status free_motion(Instance *instance, const double x[], double time, double nex
                                LARGEST_TURN);
     composite_refresh_axes(instance);
     memcpy(next, x, STATE_COUNT * sizeof(double));
-    if (x[4] == 0.0 && x[5] == 0.0 && x[6] == 0.0) return STATUS_OK;
+    if (is_at_rest(x)) return STATUS_OK;
     double left = time;
     Status status = STATUS_OK;
     for (int piece = 0; left != 0.0 && status == STATUS_OK; piece++)
@@ -138,6 +142,7 @@ enum { LARGEST_EXPONENT = 900 };
 /* Makes now.from_epoch. Returns whether it serves. */
 static bool find_constants(Instance *instance) {
     Dynamics *now = &instance->now;
+    if (is_at_rest(now->epoch)) return false;
     composite_refresh_axes(instance);
     const Scaled scaled = scale(instance, now->epoch, 0.0);
     if (has_tiny_rate(&scaled) || abs(scaled.exponent) > LARGEST_EXPONENT) return false;

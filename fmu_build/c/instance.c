@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MESSAGE_SIZE = 1024 };
+enum { MESSAGE_SIZE = 1024, LONGEST_NAME = 200 };
 
 static const struct {
     const char *name;
@@ -25,11 +25,37 @@ static const double LARGEST_TOLERANCE = 0.1;
 
 static const size_t LOG_CATEGORY_COUNT = sizeof LOG_CATEGORIES / sizeof LOG_CATEGORIES[0];
 
+/* How many bytes at the beginning of a text, in UTF-8, are no character to be shown: controls, separators of lines, marks
+   that turn the direction of writing, and the percent sign, since a logger of FMI 2 takes messages for formats. */
+static size_t not_shown(const char *text) {
+    const unsigned char *c = (const unsigned char *)text;
+    if (c[0] < 0x20 || c[0] == 0x7F || c[0] == '%') return 1;
+    if ((c[0] == 0xC2 && c[1] >= 0x80 && c[1] <= 0x9F) || (c[0] == 0xD8 && c[1] == 0x9C)) return 2;
+    if (c[0] != 0xE2 || (c[1] != 0x80 && c[1] != 0x81)) return 0;
+    const bool mark = c[2] == 0x8E || c[2] == 0x8F || (c[2] >= 0xA8 && c[2] <= 0xAE);
+    const bool isolate = c[2] >= 0xA6 && c[2] <= 0xA9;
+    return (c[1] == 0x80 ? mark : isolate) ? 3 : 0;
+}
+
+void instance_print(const char *text, char shown[PRINT_SIZE]) {
+    size_t read = 0, written = 0;
+    while (text[read] && read < LONGEST_NAME) {
+        const size_t escaped = not_shown(text + read);
+        for (size_t i = 0; i < escaped; i++)
+            written += (size_t)snprintf(shown + written, PRINT_SIZE - written, "\\x%02x", (unsigned char)text[read++]);
+        if (escaped == 0) shown[written++] = text[read++];
+    }
+    while (text[read] && written > 0 && (text[read] & 0xC0) == 0x80) { /* no part of a character */
+        read--;
+        written--;
+    }
+    shown[written] = '\0';
+}
+
 Instance *instance_new(const char *name, bool model_exchange) {
-    const size_t length = strlen(name);
-    Instance *instance = calloc(1, sizeof *instance + length + 1);
+    Instance *instance = calloc(1, sizeof *instance);
     if (!instance) return NULL;
-    memcpy(instance->name, name, length + 1);
+    instance_print(name, instance->name);
     instance->now.model_exchange = model_exchange;
     instance_reset(instance);
     return instance;
@@ -154,9 +180,9 @@ Status instance_start_attitude(Instance *instance) {
         return instance_refuse(instance, "attitude_start = (0, 0, 0, 0): must have a length greater than 0");
     for (size_t i = 0; i < 4; i++) square += (attitude[i] / largest) * (attitude[i] / largest);
     /* what is at unit length within rounding stays as it is: nothing is gained by rounding once more */
-    const double plain = attitude[0] * attitude[0] + attitude[1] * attitude[1] + attitude[2] * attitude[2] +
-                         attitude[3] * attitude[3];
-    const bool is_unit = fabs(plain - 1.0) <= 4.0 * DBL_EPSILON;
+    const double near = largest <= 2.0 ? 1.0 : 0.0, q[4] = {near * attitude[0], near * attitude[1], near * attitude[2],
+                                                            near * attitude[3]};
+    const bool is_unit = fabs((q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]) - 1.0) <= 4.0 * DBL_EPSILON;
     double *x = instance_x(instance);
     for (size_t i = 0; i < 4; i++) x[i] = is_unit ? attitude[i] : attitude[i] / largest / sqrt(square);
     instance_state_moved(instance);

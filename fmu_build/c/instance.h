@@ -6,6 +6,7 @@
 #ifndef INSTANCE_H
 #define INSTANCE_H
 
+#include <fenv.h>
 #include <stdbool.h>
 #include <stddef.h>
 
@@ -46,6 +47,9 @@ typedef struct {
     unsigned states;
     Status refusal;
 } Call;
+
+/* Of a text that instance_print writes. */
+enum { PRINT_SIZE = 4 * 202 + 1 };
 
 typedef struct Instance Instance;
 
@@ -91,6 +95,7 @@ typedef struct {
 #endif
     unsigned stop_time_defined;
     unsigned composite_is_current;    /* p and c follow from the inputs as they are */
+    unsigned composite_is_ordinary;   /* products of a few numbers of p and c are doubles */
     unsigned axes_are_current;        /* a follows from c */
     unsigned epoch_holds;             /* the motion has been free since epoch, with stepped_p */
 #if FREE == FREE_ALWAYS || FREE == FREE_WHILE_FREE
@@ -129,8 +134,12 @@ struct Instance {
     bool within_step;                 /* in the importer's callback: most calls have to wait */
     bool event_mode_used;             /* in co-simulation */
     unsigned log_categories;
-    char name[];                      /* the importer's name of the instance */
+    char name[PRINT_SIZE];            /* the importer's name of the instance, as it is printed */
 };
+
+/* Writes a text of the importer's as it may be printed: 200 bytes of it at most, what is no character to be shown, and
+   the percent sign, as \xNN for each of its bytes. */
+void instance_print(const char *text, char shown[PRINT_SIZE]);
 
 /* Returns a new instance in state INSTANTIATED with the scene's start values, or NULL if there is no memory. */
 Instance *instance_new(const char *name, bool model_exchange);
@@ -203,6 +212,24 @@ static inline void instance_set_state_arguments(Instance *instance) {
 #if STATE_IS_MOMENTUM
     instance->arg[0] = instance_states(instance);
 #endif
+}
+
+/* Whether products of a few of these numbers are doubles. */
+bool are_ordinary(const double numbers[], size_t count);
+
+/* Whether all that follows from states, inputs and composite surely is within the range of doubles. */
+bool instance_is_ordinary(Instance *instance);
+
+typedef int ModelFunction(const double **arg, double **res, int *iw, double *w, int mem);
+
+/* Calls one of the model's functions. It gives results together: where they are not surely within the range of doubles,
+   one that nobody has asked for may overflow, and those asked for are judged one by one afterwards. An importer that
+   traps overflow must not die of the others, and no flag of its own may change. */
+static inline void instance_call(Instance *instance, ModelFunction *function, bool ordinary) {
+    fenv_t importers;
+    if (!ordinary) feholdexcept(&importers);
+    function(instance->arg, instance->res, instance->iw, instance->w, 0);
+    if (!ordinary) fesetenv(&importers);
 }
 
 /* Sets the time to start at and, if defined, the time not to be passed [s] and the importer's own tolerance. */

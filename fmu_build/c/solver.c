@@ -16,10 +16,12 @@ static const double HALF_ULP = 0.5 * DBL_EPSILON;
 
 #if STEPS != STEPS_BY_ANGLE
 
-/* Without overflow. */
+/* Sums of three squares of numbers below this do not overflow. */
+static const double SQUARABLE = 0x1p510;
+
 static double length_of(const double v[3]) {
-    const double length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-    if (length <= DBL_MAX) return length;
+    if (fabs(v[0]) < SQUARABLE && fabs(v[1]) < SQUARABLE && fabs(v[2]) < SQUARABLE)
+        return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
     const double a = v[0] * 0x1p-600, b = v[1] * 0x1p-600, c = v[2] * 0x1p-600;
     return sqrt(a * a + b * b + c * c) * 0x1p600;
 }
@@ -55,7 +57,7 @@ static Status check_times(Instance *instance, double time, double h) {
                               time, now->values[REFERENCE_TIME]);
     if (!isfinite(time + h))
         return instance_error(instance, "the step from %.17g s by %.10g s ends beyond all finite times", time, h);
-    if (now->stop_time_defined && time + h > now->stop_time + larger(slack, 4.0 * DBL_EPSILON * fabs(now->stop_time)))
+    if (now->stop_time_defined && (time + h) - now->stop_time > larger(slack, 4.0 * DBL_EPSILON * fabs(now->stop_time)))
         return instance_error(instance, "the step from %.17g s by %.10g s passes stopTime = %.17g s", time, h,
                               now->stop_time);
     return STATUS_OK;
@@ -137,6 +139,10 @@ static int series_order(double tolerance) {
 
 #endif
 
+/* From one sub-step to the next the size grows by this factor at most: by it too where the error is less than the share
+   NO_ERROR of what is allowed, whose quotient need not be a double. */
+static const double MOST_GROWTH = 5.0, NO_ERROR = 0x1p-300;
+
 /* Refuses a step that needs so many sub-steps. */
 static Status refuse_count(Instance *instance, const Progress *progress, double count) {
     const double *x = instance_x(instance);
@@ -196,10 +202,18 @@ static const double LONGEST_SHARE = 1.2;
 static const double AIM = 0.8;
 
 /* What the error `found` at the communication step's end is where a sub-step's errors of attitude and rate, the larger
-   of the two by its own size, are no more than rounding. */
+   of the two by its own size, are no more than rounding. A body that neither turns nor accelerates has no errors. Divisors
+   are guarded, not divisions: compilers may divide before they ask. */
 static double rounding_of(double found, const double error[2], double speed) {
-    const double worst = larger(error[0], error[1] / speed);
-    return worst > 0.0 ? HALF_ULP * (found / worst) : 0.0;
+    const double worst = larger(error[0], error[1] / (speed > 0.0 ? speed : 1.0));
+    return HALF_ULP * (found / (worst > 0.0 ? worst : 1.0));
+}
+
+/* For how long [s] an error of the rate counts. */
+static double reach_of(double remaining, double speed) {
+    if (!(speed > 0.0)) return remaining;
+    const double left = larger(remaining, 1.0 / speed);
+    return smaller(left, TURNED_ON / speed + TURNED_ON_SHARE * left);
 }
 
 static void begin_series(Instance *instance, Progress *progress) {
@@ -227,12 +241,12 @@ static Status sub_step(Instance *instance, Progress *progress) {
         if (!(count <= MOST_SUB_STEPS)) return refuse_count(instance, progress, count);
         taylor_series(x, progress->acceleration, map, size, &series);
         const double speed = length_of(series.rates[0]) + length_of(series.rates[1]);
-        const double left = larger(progress->remaining, speed > 0.0 ? 1.0 / speed : 0.0);
-        const double reach = smaller(left, TURNED_ON / speed + TURNED_ON_SHARE * left);
+        const double reach = reach_of(progress->remaining, speed);
         const double found = series.error[0] + series.error[1] * reach;
         const double rounding = rounding_of(found, series.error, speed);
         const double allowed = larger(SAFETY * instance->now.tolerance * (size / progress->h), rounding);
-        const double best = found > 0.0 ? pow(AIM * allowed / found, 1.0 / series.order) : 5.0;
+        const bool seen = found > NO_ERROR * allowed;
+        const double best = seen ? pow(AIM * allowed / found, 1.0 / series.order) : MOST_GROWTH;
         double taken = size, next[STATE_COUNT];
         if (!(found <= allowed)) taken = without_rest(progress, best * size);
         else if (best > 1.0 && 2.0 * LONGEST_SHARE * size < progress->remaining)
@@ -248,7 +262,7 @@ static Status sub_step(Instance *instance, Progress *progress) {
             memcpy(progress->rest, rest, sizeof rest);
             go_on(instance, progress, next, taken, error + HALF_ULP * (1.0 + speed * size) + (drift - progress->drift));
             progress->drift = drift;
-            progress->next_size = size * smaller(best, 5.0);
+            progress->next_size = size * smaller(best, MOST_GROWTH);
             return STATUS_OK;
         }
         progress->next_size = 0.2 * size;
@@ -298,14 +312,16 @@ static Status sub_step(Instance *instance, Progress *progress) {
         const Status status = take_step(instance, size, next, error);
         if (status != STATUS_OK) return status;
         const double speed = larger(length_of(x + 4), length_of(next + 4));
-        const double reach = larger(progress->remaining, speed > 0.0 ? 1.0 / speed : 0.0);
+        const double reach = speed > 0.0 ? larger(progress->remaining, 1.0 / speed) : progress->remaining;
         const double rounding = HALF_ULP * (1.0 + speed * reach);
         const double allowed = larger(SAFETY * tolerance * (size / progress->h), rounding);
         const double found = error[0] + error[1] * reach;
         const bool usable = is_finite(next) && isfinite(found);
         if (usable && found <= allowed) {
             go_on(instance, progress, next, size, found + HALF_ULP * (1.0 + speed * size));
-            if (progress->remaining > 0.0) progress->next_size = size * fmin(5.0, 0.9 * pow(allowed / found, power));
+            if (progress->remaining == 0.0) return STATUS_OK;
+            const double best = found > NO_ERROR * allowed ? 0.9 * pow(allowed / found, power) : MOST_GROWTH;
+            progress->next_size = size * fmin(MOST_GROWTH, best);
             return STATUS_OK;
         }
         progress->next_size = size * (usable ? larger(0.2, 0.9 * pow(allowed / found, power)) : 0.2);

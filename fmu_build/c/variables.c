@@ -43,13 +43,26 @@ Status instance_check_attitude(Instance *instance) {
     return STATUS_OK;
 }
 
+bool are_ordinary(const double numbers[], size_t count) {
+    static const double limit = 0x1p150;
+    bool ordinary = true;
+    for (size_t i = 0; i < count; i++) ordinary = ordinary && fabs(numbers[i]) <= limit;
+    return ordinary;
+}
+
+bool instance_is_ordinary(Instance *instance) {
+    return instance->now.composite_is_ordinary && are_ordinary(instance_x(instance), STATE_COUNT) &&
+           (!STATE_IS_MOMENTUM || are_ordinary(instance_states(instance), STATE_COUNT)) &&
+           are_ordinary(&instance->now.values[REFERENCE_TORQUE], INPUT_U_COUNT);
+}
+
 static Status refresh_outputs(Instance *instance) {
     if (instance->outputs_are_current) return STATUS_OK;
     const Status status = instance_check_attitude(instance);
     if (status != STATUS_OK) return status;
     instance_set_arguments(instance);
     instance->res[0] = &instance->now.values[REFERENCE_OUTPUTS];
-    outputs(instance->arg, instance->res, instance->iw, instance->w, 0);
+    instance_call(instance, outputs, instance_is_ordinary(instance));
     instance->outputs_are_current = true;
     return STATUS_OK;
 }
@@ -59,7 +72,7 @@ static Status refresh_rates(Instance *instance) {
     changes_mirror(instance);
     instance_set_state_arguments(instance);
     instance->res[0] = instance_rates(instance);
-    ode(instance->arg, instance->res, instance->iw, instance->w, 0);
+    instance_call(instance, ode, instance_is_ordinary(instance));
     instance->rates_are_current = true;
     return STATUS_OK;
 }

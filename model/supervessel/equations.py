@@ -399,11 +399,13 @@ def body_parts(scene: Scene, body: Body) -> dict[str, ca.SX]:
     """Returns those parts of c by name that follow from the whole as one body in the root's axes."""
     law = LAWS[scene.rotation.law]
     J = body.inertia
-    lower, pivots = ldl(J)
+    steady = scene.rotation.law == "none"  # the one law that takes points, whose moments are 0
+    lower, pivots = ldl(J, singular=steady)
+    second = ca.if_else(pivots[1] == 0.0, 1.0, pivots[1]) if steady else pivots[1]
     margins = ca.vertcat(
         pivots[0],
         pivots[1] - PIVOT_SLACK * J[1, 1],
-        pivots[2] - PIVOT_SLACK * (J[2, 2] * (J[1, 1] / pivots[1])),
+        pivots[2] - PIVOT_SLACK * (J[2, 2] * (J[1, 1] / second)),
     )
     parts = {
         "mass": body.mass,
@@ -414,7 +416,7 @@ def body_parts(scene: Scene, body: Body) -> dict[str, ca.SX]:
         "law": law.prepare(J),
     }
     if body.spin is not None:
-        bound = ca.trace(ldl_inverse(lower, pivots))
+        bound = ca.SX(0.0) if steady else ca.trace(ldl_inverse(lower, pivots))
         parts["momentum"] = ca.vertcat(body.spin, ca.sumsqr(body.spin) * bound * bound)
     return {name: ca.densify(part) for name, part in parts.items()}
 

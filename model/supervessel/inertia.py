@@ -136,10 +136,19 @@ def combine_numbers(
     masses   : (n,) [kg]
     centres  : (3, n) [m]
     inertias : (3, 3, n) [kg m2]
-    Sums are cumulative ones, which add from the first to the last.
+    Sums are cumulative ones, which add from the first to the last. What overflows is inf or NaN, as in
+    `combine`: the check of the whole scene refuses it.
     """
     if len(masses) == 1:
         return float(masses[0]), centres[:, 0], inertias[:, :, 0]
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _combined_numbers(masses, centres, inertias)
+
+
+def _combined_numbers(
+    masses: NDArray[np.float64], centres: NDArray[np.float64], inertias: NDArray[np.float64]
+) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+    """Returns what `combine_numbers` does for two bodies or more."""
     offsets = centres - centres[:, :1]
     mass = np.cumsum(masses)[-1]
     centre = np.cumsum(masses[1:] * offsets[:, 1:], axis=1)[:, -1] / mass
@@ -168,12 +177,20 @@ def offset_tensor(d: ca.SX) -> ca.SX:
     return symmetric(lambda i, j: _offset_square(d, i, j))
 
 
-def ldl(inertia: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Returns the unit lower factor's (l21, l31, l32), (3,), and the pivots, (3,), of J = L D L^T."""
-    l21, l31 = inertia[1, 0] / inertia[0, 0], inertia[2, 0] / inertia[0, 0]
+def ldl(inertia: ca.SX, singular: bool = False) -> tuple[ca.SX, ca.SX]:
+    """Returns the unit lower factor's (l21, l31, l32), (3,), and the pivots, (3,), of J = L D L^T.
+
+    singular : whether pivots may be zero; a quotient by such a pivot is one by 1
+    """
+
+    def divisor(pivot: ca.SX) -> ca.SX:
+        return ca.if_else(pivot == 0.0, 1.0, pivot) if singular else pivot
+
+    d1 = divisor(inertia[0, 0])
+    l21, l31 = inertia[1, 0] / d1, inertia[2, 0] / d1
     d2 = inertia[1, 1] - l21 * inertia[1, 0]
     below = inertia[2, 1] - l31 * inertia[1, 0]
-    l32 = below / d2
+    l32 = below / divisor(d2)
     d3 = inertia[2, 2] - l31 * inertia[2, 0] - l32 * below
     return ca.vertcat(l21, l31, l32), ca.vertcat(inertia[0, 0], d2, d3)
 

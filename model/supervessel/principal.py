@@ -21,7 +21,11 @@ moments feel the square of that.
 TIE = 2.0**-40
 """Weight of the rule that decides between frames of equal scalar part: see `principal`."""
 
-LEAST = 2.0**-1022
+LEAST_SHARE, LEAST = 2.0**-900, 2.0**-1022
+"""Of the largest moment, and at least: what stands for the difference of two equal moments where it divides.
+
+Quotients by it pass for infinity and are doubles still.
+"""
 
 _Rows = list[list[ca.SX]]
 
@@ -80,17 +84,19 @@ def principal_forward(moments: ca.SX, rotation: ca.SX, d_inertia: ca.SX) -> tupl
     v_i . dJ v_j / (lambda_i - lambda_j), (i, j, k) cyclic: J R = R diag(lambda) differentiated. Linear in
     d_inertia, so that transposing gives its weights. Equal moments are not differentiable: what is returned
     are their changes along the axes that `principal` happened to choose. The axes are not even continuous
-    there: where dJ tilts them, the change of the quaternion is 4e307 times that, if not beyond all doubles,
-    for infinity. Jumps from one proper frame to another are left out.
+    there: where dJ tilts them, the change of the quaternion is about 1e271 times that over the largest
+    moment, for infinity. Jumps from one proper frame to another are left out.
     """
     change = rotation.T @ d_inertia @ rotation
-    turn = ca.vertcat(*(change[i, j] / _gap(moments[i] - moments[j]) for i, j in ((1, 2), (2, 0), (0, 1))))
+    turn = ca.vertcat(
+        *(change[i, j] / _gap(moments[i] - moments[j], moments[2]) for i, j in ((1, 2), (2, 0), (0, 1)))
+    )
     return ca.diag(change), attitude_dot(quaternion(rotation), turn)
 
 
-def _gap(difference: ca.SX) -> ca.SX:
-    """Returns the difference of two moments; for none the least number whose reciprocal is one."""
-    return ca.if_else(difference == 0.0, LEAST, difference)
+def _gap(difference: ca.SX, largest: ca.SX) -> ca.SX:
+    """Returns the difference of two moments, or, where there is none, a small number to divide by."""
+    return ca.if_else(difference == 0.0, ca.fmax(LEAST_SHARE * largest, LEAST), difference)
 
 
 def _rotate(A: _Rows, V: _Rows, p: int, q: int) -> None:
@@ -103,10 +109,11 @@ def _rotate(A: _Rows, V: _Rows, p: int, q: int) -> None:
     off = A[p][q]
     gap = A[q][q] - A[p][p]
     slight = ca.fabs(off) <= ca.fabs(gap)
-    ratio = off / ca.if_else(
+    # the numerator of the quotient that is not used is zero: the square of a huge moment would overflow
+    ratio = ca.if_else(slight, off, 0.0) / ca.if_else(
         ca.logic_and(slight, gap != 0.0), gap, 1.0
     )  # half the tangent of twice the angle
-    cotangent = 0.5 * gap / ca.if_else(slight, 1.0, off)  # of twice the angle
+    cotangent = ca.if_else(slight, 0.0, 0.5 * gap) / ca.if_else(slight, 1.0, off)  # of twice the angle
     backwards = cotangent < 0.0
     size = ca.if_else(backwards, -cotangent, cotangent)
     steep = 1.0 / (size + ca.sqrt(1.0 + cotangent * cotangent))

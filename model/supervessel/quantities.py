@@ -99,8 +99,10 @@ def triangle_problem(moments: Vector) -> str:
 
 def tensor_problem(tensor: NDArray[np.float64]) -> str:
     """Returns why no rigid body has this inertia tensor, (3, 3) [kg m2], symmetric, or "" if one may."""
-    moments = np.linalg.eigvalsh(tensor)
-    slack = EIGENVALUE_SLACK * float(np.abs(moments).max())
+    moments: list[float] = np.linalg.eigvalsh(
+        tensor
+    ).tolist()  # sums beyond all floats are inf without a warning
+    slack = EIGENVALUE_SLACK * max(map(abs, moments))
     three = ", ".join(f"{moment:.10g}" for moment in moments)
     if moments[0] < -slack:
         return f"must be positive semidefinite, but its principal moments are {three} kg m2"

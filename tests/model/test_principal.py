@@ -476,7 +476,7 @@ def test_changes_of_equal_moments_are_moderate_and_of_the_axes_beyond_all_use(
     rotation = evaluated(J)[1]
     assert np.abs(changes[:3] - np.diag(rotation.T @ dJ @ rotation)).max() <= 8 * U
     assert changes[:3].sum() == pytest.approx(np.trace(dJ), abs=8 * U)
-    assert np.abs(changes[3:]).max() > 1e300
+    assert np.abs(changes[3:]).max() > 1e260
 
 
 def test_axes_of_a_diagonal_tensor_turn_towards_the_larger_moment() -> None:

@@ -23,6 +23,7 @@ from fmu_build.compiler import FLAGS, TRIAL_FLAGS
 from fmu_build.platforms import host_platform
 from fmu_build.sources import source_file_names, source_files
 from supervessel import Scene, parse_scene
+from support.traps import watch
 
 EPS = 2.0**-52
 OK, WARNING, DISCARD, ERROR = range(4)
@@ -164,6 +165,8 @@ def _description(folder: Path) -> Any:
 class Instance:
     """An instance of a built FMU, of either version and interface, addressed by variable names.
 
+    A call that succeeds and raises a floating-point exception other than underflow or inexact fails the test.
+
     optimised : see `unpacked`
     Each call returns the FMI status; `log` holds (status, category, message) of each line logged.
     """
@@ -193,9 +196,11 @@ class Instance:
         }
         if fmi == 3:
             self.fmu = (FMU3Model if exchange else FMU3Slave)(**arguments)
+            watch(self.fmu)
             self.fmu.instantiate(loggingOn=logging, logMessage=self._log3, **instantiation)
         else:
             self.fmu = (FMU2Model if exchange else FMU2Slave)(**arguments)
+            watch(self.fmu)
             callbacks = fmi2CallbackFunctions()
             callbacks.logger = fmi2CallbackLoggerTYPE(self._log2)
             self.fmu.instantiate(loggingOn=logging, callbacks=callbacks)

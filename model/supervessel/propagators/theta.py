@@ -179,7 +179,7 @@ def _motion(moments: ca.SX, omega: ca.SX) -> _Motion:
     fastest = (L0 * w0 + L1 * w1 + L2 * w2 + length * peak / J2) / (length + peak)
     real, imaginary = _turn(turning, ca.SX(1.0), ca.SX(1.0))
     return _Motion(
-        frequency=ca.if_else(nome <= LARGEST_NOME, ca.if_else(steady, 0.0, frequency), ca.SX.nan()),
+        frequency=ca.if_else(steady, 0.0, frequency),
         half=0.5 * fastest - 2.0 * frequency * (imaginary / real),
         phase=(ca.if_else(steady, 1.0, cos), ca.if_else(steady, 1.0, sin)),
         series=series,
@@ -193,6 +193,8 @@ def _motion(moments: ca.SX, omega: ca.SX) -> _Motion:
 def _means(A: ca.SX, B: ca.SX, A_less_B: ca.SX, start: Pair, rise: ca.SX) -> tuple[ca.SX, Pair, ca.SX, Pair]:
     """Returns v/t, (cos v, sin v) at the start, the nome, and nome^2 times exp(2 b) and exp(-2 b).
 
+    v/t is NaN where the nome is too large.
+
     start : (cn, sn) at the start
     rise  : sqrt(m) times -i sn(i b 2 K/pi), dn there being l/L2 as L2 is greatest, m = B/A
 
@@ -201,8 +203,12 @@ def _means(A: ca.SX, B: ca.SX, A_less_B: ca.SX, start: Pair, rise: ca.SX) -> tup
     way, or, if that is nearer to i K' than to 0, the distance from there.
     """
     a, b = ca.sqrt(A), ca.sqrt(A_less_B)
-    difference = B / (a + b)
-    m = B / A
+    difference, m = B / (a + b), B / A
+    nome_square = _nome_square(a, b, difference)
+    serves = ca.sqrt(nome_square) <= LARGEST_NOME
+    # where it does not, quotients below would be 0/0 or overflow: a spin that is steady takes their place
+    b, difference = ca.if_else(serves, b, a), ca.if_else(serves, difference, 0.0)
+    nome_square, m = ca.if_else(serves, nome_square, 0.0), ca.if_else(serves, m, 0.0)
     square = rise * rise
     low = square <= ca.sqrt(m)
     size = ca.if_else(
@@ -211,17 +217,13 @@ def _means(A: ca.SX, B: ca.SX, A_less_B: ca.SX, start: Pair, rise: ca.SX) -> tup
     size = ca.if_else(rise == 0.0, 1.0, size)  # exp of minus twice that distance, at first of its amplitude
     reached, delays, growths = size, [], []
     cos, sin = start
-    nome_square = ca.SX(0.0)
-    for step in range(MEANS):
+    for _ in range(MEANS):
         ratio = difference / (a + b)
         delays.append(_unit((a * cos * cos + b * sin * sin, -difference * cos * sin)))
         cos, sin = _unit(complex_product((cos, sin), (a * cos, b * sin)))
         growths.append((1.0 + ratio / (reached + TINY)) / (1.0 + ratio * reached))
         reached = reached * (reached + ratio) / (1.0 + ratio * reached)
-        a, b = 0.5 * (a + b), ca.sqrt(a * b)
-        difference = _square(0.5 * difference) / (a + b)
-        if step == 0:
-            nome_square = _nome(0.5 * difference / (a + b + 2.0 * ca.sqrt(a * b)))
+        a, b, difference = _mean(a, b, difference)
     behind: Pair = (ca.SX(1.0), ca.SX(0.0))
     growth = ca.SX(1.0)
     for delay, factor in zip(reversed(delays), reversed(growths), strict=True):
@@ -232,7 +234,19 @@ def _means(A: ca.SX, B: ca.SX, A_less_B: ca.SX, start: Pair, rise: ca.SX) -> tup
         ca.if_else(low, nome_square / size, nome * size),
         ca.if_else(low, nome_square * size, nome_square * nome / size),
     )
-    return a, _unit(complex_product(start, behind)), nome, sides
+    return ca.if_else(serves, a, ca.SX.nan()), _unit(complex_product(start, behind)), nome, sides
+
+
+def _mean(a: ca.SX, b: ca.SX, difference: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Returns the arithmetic and the geometric mean of a and b, and their difference, from a - b."""
+    mean, other = 0.5 * (a + b), ca.sqrt(a * b)
+    return mean, other, _square(0.5 * difference) / (mean + other)
+
+
+def _nome_square(a: ca.SX, b: ca.SX, difference: ca.SX) -> ca.SX:
+    """Returns the nome's square for sqrt(A), sqrt(A - B) and what they differ by."""
+    a, b, difference = _mean(a, b, difference)
+    return _nome(0.5 * difference / (a + b + 2.0 * ca.sqrt(a * b)))
 
 
 def _nome(share: ca.SX) -> ca.SX:

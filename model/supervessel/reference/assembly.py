@@ -127,9 +127,9 @@ def sample_points(pmi: ArrayLike, convention: str = "rigid_body") -> Array:
         >>> reference.sample_points([1.0, 1.0, 1.0])[0].round(6).tolist()
         [1.224745, 0.0, 0.0]
     """
-    k1, k2, k3 = np.asarray(pmi, dtype=float)
+    k1, k2, k3 = 0.25 * np.asarray(pmi, dtype=float)  # the sum of two moments may be too large for a float
     squares = 1.5 * np.array([k2 + k3 - k1, k3 + k1 - k2, k1 + k2 - k3])
-    half = np.diag(np.sqrt(np.abs(squares) if convention == "orbiter" else np.maximum(squares, 0.0)))
+    half = 2.0 * np.diag(np.sqrt(np.abs(squares) if convention == "orbiter" else np.maximum(squares, 0.0)))
     return np.vstack([half, -half])
 
 

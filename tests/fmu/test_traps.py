@@ -1,0 +1,149 @@
+"""Hosts that trap floating-point exceptions: no call that succeeds raises one but underflow or inexact.
+
+`support.Instance` watches every call of every test. Here are the cases that raised one, and a host that
+traps.
+"""
+
+import platform
+import subprocess
+import sys
+import tempfile
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmpy import read_model_description
+
+from fmu_build.compiler import fmi_headers
+from fmu_build.platforms import host_platform
+from support import ISS_DG, OK, Instance, body, store, unpacked, variant
+from support.traps import FLAGS_KNOWN
+
+needs_glibc = pytest.mark.skipif(
+    platform.system() != "Linux" or platform.libc_ver()[0] != "glibc", reason="feenableexcept is glibc's"
+)
+needs_flags = pytest.mark.skipif(
+    not FLAGS_KNOWN, reason="the bits of the floating-point flags are unknown here"
+)
+FMI = pytest.mark.parametrize("fmi", [2, 3])
+PROPAGATORS = ("auto", "taylor", "dop853", "rk4", "exact")
+SPINS = {
+    "rest": (0.0, 0.0, 0.0),
+    "about the first axis": (0.3, 0.0, 0.0),
+    "about the middle axis": (0.0, 0.3, 0.0),
+    "about the last axis": (0.0, 0.0, -0.3),
+    "tumbling": (0.1, 0.2, 0.3),
+    "denormal": (1e-310, 1e-310, 0.0),
+    "slow": (1e-160, 2e-160, 0.0),
+    "fast": (3e5, 0.0, 1e5),
+}
+MOMENTS = {"general": (1.0, 2.0, 2.5), "symmetric": (1.0, 1.0, 1.5), "spherical": (2.0, 2.0, 2.0)}
+
+
+@cache
+def host() -> Path:
+    """Returns the program that traps."""
+    program = Path(tempfile.mkdtemp(dir=store())) / "traps"
+    command = [sys.executable, "-m", "ziglang", "cc", "-target", host_platform().target, "-std=gnu99", "-O2"]
+    command += ["-isystem", str(fmi_headers()), f"-I{Path(__file__).parent.parent / 'support'}"]
+    command += [str(Path(__file__).with_name("traps.c")), "-o", str(program), "-lm", "-ldl"]
+    subprocess.run(command, check=True)
+    return program
+
+
+@needs_glibc
+@pytest.mark.parametrize("spin", [name for name in SPINS if name != "fast"])
+@pytest.mark.parametrize("propagator", ["auto", "taylor"])
+def test_a_host_that_traps_lives(propagator, spin):
+    folder = unpacked(body(propagator=propagator))
+    description = read_model_description(str(folder))
+    [rate] = [v.valueReference for v in description.modelVariables if v.name == "angular_velocity_start[1]"]
+    library = folder / "binaries" / host_platform().name / f"body{host_platform().suffix}"
+    words = [host(), library, description.guid, 5, 1.0, rate, *SPINS[spin]]
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@needs_flags
+@pytest.mark.parametrize("moments", MOMENTS)
+@pytest.mark.parametrize("propagator", PROPAGATORS)
+def test_steps_and_derivatives_of_any_spin_raise_nothing(propagator, moments):
+    raw = body(pmi=MOMENTS[moments], propagator=propagator)
+    raw["outputs"]["names"] += ["principal_moments", "principal_axes"]
+    instance = Instance(raw)
+    for spin in SPINS.values():
+        assert instance.reset() == OK
+        assert instance.initialise(angular_velocity_start=spin) == OK
+        for _ in range(3):
+            instance.step(0.5)
+            for name in instance.references:
+                assert instance.get_status(name) == OK
+            unknowns = [name for name in instance.references if name.startswith(("der(", "principal", "kin"))]
+            knowns = [name for name in instance.references if name.startswith(("torque", "state."))]
+            instance.directional(unknowns, knowns, np.ones(len(knowns)))
+            instance.adjoint(unknowns, knowns, np.ones(len(unknowns)))
+    instance.free()
+
+
+@needs_flags
+@FMI
+def test_a_point_whose_rate_stays_raises_nothing(fmi):
+    instance = Instance(body(pmi=(0.0, 0.0, 0.0), law="none", propagator="auto"), fmi)
+    assert instance.initialise(angular_velocity_start=[0.1, 0.2, 0.3]) == OK
+    assert [instance.step(1.0) for _ in range(3)] == [OK] * 3
+    instance.free()
+
+
+@needs_flags
+@FMI
+def test_what_overflows_unasked_raises_nothing(fmi):
+    instance = Instance(body(propagator="auto"), fmi)
+    assert instance.initialise(angular_velocity_start=[1e200, 0.0, 0.0]) == OK
+    assert instance.get_status("kinetic_energy") != OK
+    assert fmi == 2 or instance.get_status("attitude") == OK
+    instance.free()
+
+
+@needs_flags
+@FMI
+@pytest.mark.parametrize("attitude", [(1e308, 1e308, 1e308, 1e308), (5e-324, 0.0, 0.0, 0.0)])
+def test_an_attitude_of_any_length_at_the_start_raises_nothing(attitude, fmi):
+    instance = Instance(body(propagator="auto"), fmi)
+    assert instance.enter(stop=1.7e308) == OK
+    assert instance.set({"attitude_start": attitude}) == OK
+    instance.directional(["mass"], ["attitude_start[1]", "attitude_start[2]"], [1.0, 1.0])
+    assert instance.exit() == OK
+    assert instance.step(1.0) == OK
+    instance.free()
+
+
+@needs_flags
+def test_changes_of_the_axes_of_a_symmetric_body_raise_nothing():
+    raw = variant(ISS_DG, {"outputs.names": ["mass", "principal_axes"], "inputs.pmi": ["ISS"]})
+    raw = variant(raw, {"docks": None, "vessels.DG": None, "inputs": {"pmi": ["ISS"], "torque": True}})
+    instance = Instance(variant(raw, {"vessels.ISS.pmi": [385.0, 385.0, 385.0]}))
+    assert instance.initialise() == OK
+    axes, moments = instance.names("principal_axes"), instance.names("ISS.pmi")
+    assert np.all(np.isfinite(instance.directional([*axes, "mass"], moments, [1.0, 2.0, 3.0])))
+    assert np.all(np.isfinite(instance.adjoint([*axes, "mass"], moments, np.ones(5))))
+    instance.free()
+
+
+@FMI
+def test_names_of_the_importers_are_logged_without_controls_and_marks(fmi):
+    names: list[str] = []
+    given = "a\x1b[31m\u202e%n\n" + "é" * 300
+    instance = Instance(body(), fmi, name=given)
+    if fmi == 2:
+        logged = instance._log2
+
+        def log(environment, name, status, category, message):
+            names.append(name.decode())
+            logged(environment, name, status, category, message)
+
+        instance._log2 = log
+    assert instance.step(-1.0) != OK
+    assert all(message.isprintable() and "%" not in message for message in instance.messages())
+    instance.free()
+    assert all(name.isprintable() and len(name) < 900 for name in names)
