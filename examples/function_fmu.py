@@ -14,12 +14,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fmu_build.codegen import digest
-from fmu_build.compiler import compile_library
+from fmu_build.compile.compiler import compile_library
+from fmu_build.generate.scene_files import digest
+from fmu_build.generate.sources import LAYER
 from fmu_build.platforms import host_platform
-from fmu_build.sources import LAYER
-from supervessel.files import write_file
 from supervessel.problems import unknown
+from supervessel.shell.files import write_file
 
 OWN = Path(__file__).parent / "function_fmu"
 Interface = tuple[dict[str, float], list[str]]  # start values of scalar inputs by name, names of outputs

@@ -20,7 +20,7 @@ from fmpy import simulate_fmu
 
 from fmu_build import build_fmu
 from supervessel import parse_scene
-from supervessel.files import write_files
+from supervessel.shell.files import write_files
 
 EXAMPLES = Path(__file__).parent
 DURATION, STEP = 600.0, 0.1  # s

@@ -7,26 +7,26 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fmu_build.cache import cache_folder, kept_sources, reason
-from fmu_build.changes import change_tables
-from fmu_build.codegen import digest, model_source, scene_header, scene_source
-from fmu_build.compiler import FLAGS, compile_binaries
-from fmu_build.documentation import documentation
+from fmu_build.accuracy import choose
+from fmu_build.compile.compiler import FLAGS, compile_binaries
+from fmu_build.document.documentation import documentation
+from fmu_build.document.reference_result import reference_result
 from fmu_build.errors import BuildError
-from fmu_build.loop import loop_functions, loop_source, loop_steps, loop_tables
-from fmu_build.model_description import model_description
+from fmu_build.generate.change_tables import change_tables
+from fmu_build.generate.scene_files import digest, model_source, scene_header, scene_source
+from fmu_build.generate.sources import source_file_names, source_files
+from fmu_build.generate.vessel_loop import loop_functions, loop_source, loop_steps, loop_tables
+from fmu_build.interface.model_description import model_description
+from fmu_build.interface.terminals import terminals_and_icons
+from fmu_build.interface.variable_table import Entry, variable_table
 from fmu_build.platforms import Platform, host_platform
-from fmu_build.reference_result import reference_result
-from fmu_build.sources import source_file_names, source_files
-from fmu_build.table import Entry, variable_table
-from fmu_build.terminals import terminals_and_icons
-from supervessel.accuracy import choose
+from fmu_build.storage.cache import cache_folder, kept_sources, reason
+from fmu_build.trade import TradeError
 from supervessel.equations import Equations, equations
-from supervessel.files import OutputError, check_output, write_file
 from supervessel.problems import printable
-from supervessel.processes import Workers
-from supervessel.scene import Scene
-from supervessel.trade import TradeError
+from supervessel.scene.schema import Scene
+from supervessel.shell.files import OutputError, check_output, write_file
+from supervessel.shell.processes import Workers
 
 ARCHIVE_TIME = (1980, 1, 1, 0, 0, 0)
 """Every file in an archive carries the same time, so that a scene gives the same bytes each time."""
@@ -44,7 +44,7 @@ def build_fmu(scene: Scene, output: str | Path, fmi: int = 3, platforms: Sequenc
 
     scene     : from `load_scene`
     output    : the file to write; its folder must be there. An old FMU is replaced once the new is whole;
-                anything else that is there, and is not empty, is refused (see `supervessel.files`)
+                anything else that is there, and is not empty, is refused (see `supervessel.shell.files`)
     fmi       : version of the FMI standard, 2 or 3
     platforms : to compile for, of `fmu_build.platforms.PLATFORMS`; none: this machine's
     A scene with `[accuracy]` is built as `supervessel.choose` finds it; the evidence is in the archive.

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fmu_build.platforms import PLATFORMS, Platform, platforms_named
-from supervessel.console import Parser, print_results, show_progress
-from supervessel.ending import say
 from supervessel.problems import printable
+from supervessel.shell.console import Parser, print_results, show_progress
+from supervessel.shell.ending import say
 
 if TYPE_CHECKING:
     from supervessel import Scene
@@ -51,8 +51,8 @@ def _build(options: argparse.Namespace, platforms: Sequence[Platform]) -> int:
     """Builds what the options ask for; returns the exit status."""
     from fmu_build.build import build_fmu, check_fmu_output
     from fmu_build.errors import BuildError
+    from fmu_build.trade import TradeError
     from supervessel import SceneError, load_scene
-    from supervessel.trade import TradeError
 
     try:
         scene = load_scene(options.scene)
@@ -71,7 +71,7 @@ def _build(options: argparse.Namespace, platforms: Sequence[Platform]) -> int:
 
 def _choose(scene: "Scene") -> list[str]:
     """Returns what `[accuracy]` chooses, in a line; shows how far that is."""
-    from supervessel.accuracy import choose, said
+    from fmu_build.accuracy import choose, said
 
     say("; what has been flown is kept, the same command goes on from there")
     _, evidence = choose(scene, lambda what: show_progress(f"accuracy: {what}"))

@@ -3,7 +3,7 @@
 import os
 import tempfile
 
-from fmu_build.cache import cache_folder
+from fmu_build.storage.cache import cache_folder
 
 
 def pytest_configure(config):

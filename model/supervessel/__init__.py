@@ -2,11 +2,11 @@
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from fmu_build.accuracy import AccuracyError, choose
     from supervessel import reference
-    from supervessel.accuracy import AccuracyError, choose
     from supervessel.loading import load_scene, parse_scene
     from supervessel.problems import SceneError
-    from supervessel.scene import Scene
+    from supervessel.scene.schema import Scene
     from supervessel.twin import Twin
 
 __all__ = ["AccuracyError", "Scene", "SceneError", "Twin", "choose", "load_scene", "parse_scene", "reference"]

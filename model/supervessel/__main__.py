@@ -6,7 +6,7 @@ Nothing is imported here that takes time: a signal must find its handler.
 import sys
 from collections.abc import Sequence
 
-from supervessel.ending import run_as_process
+from supervessel.shell.ending import run_as_process
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -13,14 +13,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import get_args
 
-from supervessel.console import Parser, print_results, show_progress
-from supervessel.ending import say
-from supervessel.files import OutputError, check_output, made_folder, write_file, write_files
+from fmu_build.trade import TradeError, course_of, is_trade, plot, study, table
 from supervessel.loading import load_scene, parse_scene
 from supervessel.orbiter import ScenarioError, import_scenario
 from supervessel.problems import SceneError, first, printable
-from supervessel.scene import Convention, Scene, without_accuracy
-from supervessel.trade import TradeError, course_of, is_trade, plot, study, table
+from supervessel.scene.schema import Convention, Scene, without_accuracy
+from supervessel.shell.console import Parser, print_results, show_progress
+from supervessel.shell.ending import say
+from supervessel.shell.files import OutputError, check_output, made_folder, write_file, write_files
 
 TRADE_FILES = ("json", "md", "png", "svg")
 """Kinds of the files that a trade leaves, trade.KIND each; the first tells that they are a trade's."""
@@ -145,8 +145,8 @@ def _add_cache(parser: argparse.ArgumentParser) -> None:
 
 
 def _cache(options: argparse.Namespace) -> int:
-    from fmu_build.cache_report import clear, report  # noqa: PLC0415
     from fmu_build.errors import BuildError  # noqa: PLC0415
+    from fmu_build.storage.report import clear, report  # noqa: PLC0415
 
     try:
         said = clear() if options.clear else report()

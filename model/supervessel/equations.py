@@ -17,22 +17,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from supervessel.attitude import attitude_dot, rotation_matrix, to_inertial, unit
-from supervessel.changes import Change, change_functions, lookup_in
-from supervessel.docking import composite_body
-from supervessel.inertia import Body, from_upper_triangle, ldl, ldl_inverse, upper_triangle
-from supervessel.interrupts import interrupt_afterwards
-from supervessel.latest import latest
-from supervessel.principal import principal, principal_forward, quaternion
-from supervessel.propagators import PROPAGATORS, Plan, plan_of
-from supervessel.propagators.bound import fastest_square
-from supervessel.propagators.exact import free_functions, free_functions_of_start
-from supervessel.propagators.method import Motion
-from supervessel.quantities import EPSILON
-from supervessel.rotation import LAWS, principal_products
-from supervessel.scene import Scene, changes_rate, keeps_momentum
-from supervessel.variables import input_variables, output_names, state_variables
-from supervessel.vessels import (
+from supervessel.composite.actions import (
     action_parts,
     net_force,
     torque_about_barycentre,
@@ -40,6 +25,21 @@ from supervessel.vessels import (
     vessel_parts,
     vessels_shown,
 )
+from supervessel.composite.bodies import composite_body
+from supervessel.composite.inertia import Body, from_upper_triangle, ldl, ldl_inverse, upper_triangle
+from supervessel.rotation.attitude import attitude_dot, rotation_matrix, to_inertial, unit
+from supervessel.rotation.changes import Change, change_functions, lookup_in
+from supervessel.rotation.laws import LAWS, principal_products
+from supervessel.rotation.principal import principal, principal_forward, quaternion
+from supervessel.rotation.propagators import PROPAGATORS, Plan, plan_of
+from supervessel.rotation.propagators.bound import fastest_square
+from supervessel.rotation.propagators.exact import free_functions, free_functions_of_start
+from supervessel.rotation.propagators.method import Motion
+from supervessel.scene.numbers import EPSILON
+from supervessel.scene.reuse import latest
+from supervessel.scene.schema import Scene, changes_rate, keeps_momentum
+from supervessel.scene.variables import input_variables, output_names, state_variables
+from supervessel.shell.interrupts import interrupt_afterwards
 
 COMPOSITE_SIZES = {"mass": 1, "barycentre": 3, "inertia": 6, "pmi": 3, "margins": 3}
 """Layout of what every c begins with; see `composite_parts` for what follows. inertia is the upper

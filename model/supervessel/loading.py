@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from supervessel.assembly import TooManyWaysError
-from supervessel.consistency import consistency_problems
+from supervessel.composite.docks import TooManyWaysError
 from supervessel.equations import composite_at_start
-from supervessel.naming import misnamed_courses, naming_problems, size_problems
 from supervessel.problems import SceneError, few_suggestions, key_path, quantity, unknown
-from supervessel.reading import ReadingError, read_toml
-from supervessel.scene import Scene, known_keys
-from supervessel.variables import InputVariable, input_variables
+from supervessel.scene.consistency import consistency_problems
+from supervessel.scene.names import misnamed_courses, naming_problems, size_problems
+from supervessel.scene.schema import Scene, known_keys
+from supervessel.scene.variables import InputVariable, input_variables
+from supervessel.shell.reading import ReadingError, read_toml
 
 EXPECTED = {
     "dict_type": "a table",

@@ -17,9 +17,9 @@ from fmpy.fmi3 import FMU3Slave
 from scipy.integrate import solve_ivp
 
 from fmu_build import BuildError, build_fmu
+from fmu_build.trade.study import attitude_apart
 from supervessel import Scene, parse_scene, reference
-from supervessel.trade.study import attitude_apart
-from supervessel.variables import input_variables
+from supervessel.scene.variables import input_variables
 
 RTOL, ATOL = 1e-13, 1e-15
 HELD = 25

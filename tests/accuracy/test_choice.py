@@ -11,13 +11,13 @@ import pytest
 from accuracy.confirm import flown
 from fmu_build import BuildError, build_fmu
 from fmu_build.__main__ import main
+from fmu_build.accuracy.histories import course_up_to, histories
+from fmu_build.flight.choices import BEST, Choice
+from fmu_build.flight.experiment import course_of
+from fmu_build.flight.flight import Inputs, build_all, keep, read, run_host, source_of, workshop
 from supervessel import AccuracyError, Twin, choose, parse_scene
-from supervessel.accuracy.histories import course_up_to, histories
 from supervessel.equations import equations
-from supervessel.scene import without_accuracy
-from supervessel.trade.choices import BEST, Choice
-from supervessel.trade.experiment import course_of
-from supervessel.trade.flight import Inputs, build_all, keep, read, run_host, source_of, workshop
+from supervessel.scene.schema import without_accuracy
 from support import ISS_DG, variant
 from support.processes import kept_in
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import casadi as ca
 import pytest
 
-from fmu_build.compiler import TRIAL_FLAGS, compile_library
+from fmu_build.accuracy.cost import free_operations, free_spans, operations, series_operations
+from fmu_build.compile.compiler import TRIAL_FLAGS, compile_library
+from fmu_build.generate.sources import LAYER
 from fmu_build.platforms import host_platform
-from fmu_build.sources import LAYER
-from supervessel.accuracy.cost import free_operations, free_spans, operations, series_operations
 
 HERE = Path(__file__).parent
 

@@ -4,8 +4,8 @@ import re
 import tomllib
 from pathlib import Path
 
+from fmu_build.accuracy import said
 from supervessel import choose, parse_scene
-from supervessel.accuracy import said
 from support import variant
 
 ROOT = Path(__file__).parents[2]

@@ -5,9 +5,9 @@ import sys
 
 import pytest
 
+from fmu_build.flight.choices import Choice, Model, variant_of
 from supervessel import SceneError, parse_scene
-from supervessel.scene import without_accuracy
-from supervessel.trade.choices import Choice, Model, variant_of
+from supervessel.scene.schema import without_accuracy
 from support import ISS_DG, variant
 from support.processes import interrupted, needs_posix, run
 from support.signals import KEPT

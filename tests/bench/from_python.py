@@ -22,10 +22,10 @@ from propagators import DIAGONAL, RATES, TORQUE, error, scene
 from run import SCENE, by_rk4
 from scipy.integrate import solve_ivp
 
-from fmu_build.compiler import FLAGS, compile_library
+from fmu_build.compile.compiler import FLAGS, compile_library
 from fmu_build.platforms import host_platform
 from supervessel import Twin, load_scene, parse_scene
-from supervessel.control.functions import TwinFunction
+from supervessel.twin.functions import TwinFunction
 
 Array = NDArray[np.float64]
 Plain = Callable[[], float]

@@ -14,10 +14,10 @@ from fmpy import extract, read_model_description
 from fmpy.model_description import ModelDescription
 
 from fmu_build import build_fmu
-from fmu_build.compiler import FLAGS, fmi_headers
+from fmu_build.compile.compiler import FLAGS, fmi_headers
 from fmu_build.platforms import host_platform
 from supervessel import load_scene
-from supervessel.scene import Scene
+from supervessel.scene.schema import Scene
 
 HERE = Path(__file__).parent
 SCENE = HERE.parent.parent / "examples" / "iss_dg.toml"

@@ -18,9 +18,9 @@ from fmpy import extract, read_model_description
 from run import build_host
 
 from fmu_build.build import build_fmu, generate
-from fmu_build.compiler import FLAGS, compile_library
+from fmu_build.compile.compiler import FLAGS, compile_library
+from fmu_build.generate.sources import source_files
 from fmu_build.platforms import host_platform
-from fmu_build.sources import source_files
 from supervessel import Scene, parse_scene
 from supervessel.equations import p_start
 from support.costs import station

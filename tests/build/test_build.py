@@ -15,9 +15,9 @@ import pytest
 import fmu_build
 from fmu_build import BuildError, build_fmu
 from fmu_build.build import compile_sources, generate
-from fmu_build.compiler import compile_library, fmi_headers
+from fmu_build.compile.compiler import compile_library, fmi_headers
+from fmu_build.generate.sources import source_file_names, source_files
 from fmu_build.platforms import PLATFORMS, host_platform
-from fmu_build.sources import source_file_names, source_files
 from supervessel import load_scene
 from support import ISS_DG, body, built, scene, variant
 

@@ -13,13 +13,13 @@ import pytest
 
 from fmu_build import cache as caches
 from fmu_build import temporary
-from fmu_build.cache import FULL, LARGEST, OURS, TAG, TAG_TEXT, USED, cache_folder, kept_sources
-from fmu_build.compiler import compile_library
+from fmu_build.compile.compiler import compile_library
 from fmu_build.errors import BuildError
+from fmu_build.flight.flight import keep, place_of, read
 from fmu_build.platforms import host_platform
-from fmu_build.temporary import temporary_folder
+from fmu_build.storage.cache import FULL, LARGEST, OURS, TAG, TAG_TEXT, USED, cache_folder, kept_sources
+from fmu_build.storage.temporary import temporary_folder
 from supervessel.__main__ import main
-from supervessel.trade.flight import keep, place_of, read
 from support import body, scene
 from support.processes import ROOT, needs_posix
 
@@ -377,7 +377,7 @@ def test_other_layouts_of_our_making_are_cleared_too(base):
 
 WAITING = """
 import sys, time
-from fmu_build.temporary import temporary_folder
+from fmu_build.storage.temporary import temporary_folder
 with temporary_folder() as folder:
     (folder / "large").write_text("x")
     print(folder, flush=True)

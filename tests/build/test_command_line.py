@@ -296,7 +296,7 @@ def test_a_cold_cache_gives_the_same_bytes_as_a_warm_one(homeless, folder):
 @needs_root
 def test_a_user_without_a_home_has_a_cache_that_can_be_written():
     script = (
-        "import os; from fmu_build.cache import cache_folder; os.setuid(54321); "
+        "import os; from fmu_build.storage.cache import cache_folder; os.setuid(54321); "
         "folder = cache_folder(); print(os.access(folder, os.W_OK))"
     )
     variables = {

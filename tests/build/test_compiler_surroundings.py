@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from fmu_build import BuildError
-from fmu_build.cache import cache_folder
-from fmu_build.compiler import compile_library
+from fmu_build.compile.compiler import compile_library
 from fmu_build.platforms import host_platform
+from fmu_build.storage.cache import cache_folder
 from support.compilers import fake_compiler
 from support.processes import ROOT, cache, needs_posix
 
@@ -128,7 +128,7 @@ def test_no_package_of_the_working_folder_is_run(tmp_path, cache, words, names):
 def test_a_working_folder_that_is_gone_is_no_traceback(tmp_path):
     script = (
         "import os, pathlib; gone = pathlib.Path('gone'); gone.mkdir(); os.chdir(gone); "
-        "os.rmdir('../gone'); from fmu_build.compiler import compiler; print(compiler().name[:3])"
+        "os.rmdir('../gone'); from fmu_build.compile.compiler import compiler; print(compiler().name[:3])"
     )
     path = os.pathsep.join((str(ROOT), str(ROOT / "model")))
     done = subprocess.run(

@@ -13,13 +13,13 @@ import pytest
 from lxml import etree
 
 from fmu_build import BuildError
-from fmu_build.documentation import documentation
-from fmu_build.licences import header_notice, licence_files
-from fmu_build.table import variable_table
-from fmu_build.terminals import terminals_and_icons
+from fmu_build.document.documentation import documentation
+from fmu_build.document.licences import header_notice, licence_files
+from fmu_build.interface.terminals import terminals_and_icons
+from fmu_build.interface.variable_table import variable_table
 from supervessel import parse_scene
 from supervessel.equations import equations
-from supervessel.scene import PROPAGATOR_NAMES, Law
+from supervessel.scene.schema import PROPAGATOR_NAMES, Law
 from support import ISS_DG, body, variant
 
 VOID = {"meta", "br", "hr", "img", "link", "input"}
@@ -287,6 +287,6 @@ def test_a_missing_licence_text_is_named(monkeypatch):
 
     with pytest.raises(BuildError, match="fmpy"):
         header_notice("/* nothing here */")
-    monkeypatch.setattr("fmu_build.licences.distribution", lambda package: Empty())
+    monkeypatch.setattr("fmu_build.document.licences.distribution", lambda package: Empty())
     with pytest.raises(BuildError, match="supervessel has no licence text"):
         licence_files(3)

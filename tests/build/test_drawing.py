@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.image import imread
 
-from fmu_build.drawing import drawing, icon
-from fmu_build.figure import Figure, Path, Text, number, svg
-from fmu_build.geometry import VESSEL_LIMIT, assembly, semi_axes
-from fmu_build.raster import LETTERS, png
 from supervessel import parse_scene, reference
+from supervessel.drawing.drawing import drawing, icon
+from supervessel.drawing.figure import Figure, Path, Text, number, svg
+from supervessel.drawing.geometry import VESSEL_LIMIT, assembly, semi_axes
+from supervessel.drawing.raster import LETTERS, png
 from support import EPS, ISS_DG, body, random_rotation, variant
 
 SVG = "{http://www.w3.org/2000/svg}"

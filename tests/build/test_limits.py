@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 
 from supervessel import Scene, SceneError, load_scene, parse_scene
-from supervessel.naming import LONGEST_NAME, MOST_MOVING, MOST_VESSELS
 from supervessel.orbiter import ScenarioError, import_scenario
 from supervessel.problems import MOST_PROBLEMS, MOST_SUGGESTIONS
-from supervessel.reading import DEEPEST, LARGEST_TEXT, LARGEST_TOML, LONGEST_LINE, MOST_PARTS
+from supervessel.scene.names import LONGEST_NAME, MOST_MOVING, MOST_VESSELS
+from supervessel.shell.reading import DEEPEST, LARGEST_TEXT, LARGEST_TOML, LONGEST_LINE, MOST_PARTS
 from support import ISS_DG, body, variant
 
 WATCHDOG = 300

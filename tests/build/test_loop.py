@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from fmu_build.build import generate
-from fmu_build.compiler import FLAGS, compile_library
-from fmu_build.loop import LANES, LONGEST_CODE, loop_tables
+from fmu_build.compile.compiler import FLAGS, compile_library
+from fmu_build.generate.sources import source_files
+from fmu_build.generate.vessel_loop import LANES, LONGEST_CODE, loop_tables
 from fmu_build.platforms import host_platform
-from fmu_build.sources import source_files
 from supervessel import Scene, Twin, parse_scene
 from supervessel.equations import Equations, equations, p_start
 from support import EPS, ISS_DG, OK, flying, scene, store, variant

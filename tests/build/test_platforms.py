@@ -7,9 +7,9 @@ import pytest
 
 from fmu_build import BuildError
 from fmu_build.__main__ import main
-from fmu_build.compiler import compile_binaries
+from fmu_build.compile.compiler import compile_binaries
+from fmu_build.compile.universal import universal_library
 from fmu_build.platforms import PLATFORMS, host_platform, library_contents, platforms_named
-from fmu_build.universal import universal_library
 
 X86_64, ARM64 = 0x01000007, 0x0100000C
 

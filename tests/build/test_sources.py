@@ -14,9 +14,9 @@ import pytest
 from fmpy.model_description import read_build_description, read_model_description
 from lxml import etree
 
-from fmu_build.cache import cache_folder
-from fmu_build.compiler import fmi_headers
-from fmu_build.sources import layer_files, source_file_names, source_files
+from fmu_build.compile.compiler import fmi_headers
+from fmu_build.generate.sources import layer_files, source_file_names, source_files
+from fmu_build.storage.cache import cache_folder
 from support import ISS_DG, body, built
 
 STEP, STEPS = 0.1, 100

@@ -11,10 +11,10 @@ import pytest
 
 from fmu_build.build import generate
 from fmu_build.errors import BuildError
+from fmu_build.trade import TradeError
 from orbiter.files import Files
 from supervessel import SceneError, load_scene, parse_scene
 from supervessel.problems import LONGEST_PROBLEM, LONGEST_WORD, UNSEEN, printable
-from supervessel.trade import TradeError
 from support import ISS_DG, variant
 
 ROOT = Path(__file__).parents[2]

@@ -9,7 +9,7 @@ from hypothesis import Phase, given, settings
 
 from changes.histories import Values, assembly, elements, happening, start_values
 from supervessel import Scene, Twin, reference
-from supervessel.scene import VESSEL_OUTPUT_NAMES
+from supervessel.scene.schema import VESSEL_OUTPUT_NAMES
 from support import EPS, flying, scene, variant
 
 AGREEMENT = 1000 * EPS

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import fmpy
 
-from fmu_build.compiler import fmi_headers
+from fmu_build.compile.compiler import fmi_headers
 from fmu_build.platforms import host_platform
 from support import ISS_DG, built
 

@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 
 from supervessel import SceneError, parse_scene, reference
 from supervessel.equations import equations, p_start
-from supervessel.propagators import plan_of
+from supervessel.rotation.propagators import plan_of
 from support import (
     DISCARD,
     EPS,
@@ -608,7 +608,7 @@ def test_principal_outputs_follow_the_inputs_at_once_and_rebuild_the_inertia(fmi
         J = instance.get("inertia").reshape(3, 3)
     assert (np.diff(moments) >= 0.0).all()
     assert abs(np.linalg.norm(q) - 1.0) <= 4 * U
-    # the largest scalar part of four frames: see supervessel.principal
+    # the largest scalar part of four frames: see supervessel.rotation.principal
     assert q[0] >= 0.5 - 4 * U
     R = matrix(q)
     assert np.linalg.norm(R @ np.diag(moments) @ R.T - J) <= 16 * U * np.linalg.norm(J)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from fmpy import read_model_description
 
-from fmu_build.compiler import fmi_headers
+from fmu_build.compile.compiler import fmi_headers
 from fmu_build.platforms import host_platform
 from support import ISS_DG, OK, Instance, body, store, unpacked, variant
 from support.traps import FLAGS_KNOWN

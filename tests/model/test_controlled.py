@@ -13,11 +13,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate._ivp import dop853_coefficients as scipy_dop853
 
-from supervessel.attitude import attitude_dot
-from supervessel.propagators import dop853
-from supervessel.propagators.dop853 import dop853_step
-from supervessel.propagators.taylor import taylor_order, taylor_step
-from supervessel.rotation import LAWS
+from supervessel.rotation.attitude import attitude_dot
+from supervessel.rotation.laws import LAWS
+from supervessel.rotation.propagators import dop853
+from supervessel.rotation.propagators.dop853 import dop853_step
+from supervessel.rotation.propagators.taylor import taylor_order, taylor_step
 from support import EPS, random_rotation
 from support.series import Number, Vector, flight, mp, norm
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from supervessel import files
-from supervessel.files import OutputError, check_output, made_folder, write_file, write_files
+from supervessel.shell.files import OutputError, check_output, made_folder, write_file, write_files
 
 ROOT = Path(files.__file__).parents[2]
 
@@ -211,7 +211,7 @@ ATTEMPT = """
 import os, sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
-from supervessel.files import OutputError, check_output, write_files
+from supervessel.shell.files import OutputError, check_output, write_files
 try:
     {preparation}
     write_files({{Path("a"): b"new", Path("file"): b"x" * 10000}})

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from supervessel.propagators import free_motion, theta
+from supervessel.rotation.propagators import free_motion, theta
 from support import EPS, series
 
 Array = NDArray[np.float64]

@@ -10,8 +10,8 @@ from threading import Thread, Timer
 import pytest
 
 from supervessel.equations import equations
-from supervessel.interrupts import uninterrupted
-from supervessel.processes import Workers, run
+from supervessel.shell.interrupts import uninterrupted
+from supervessel.shell.processes import Workers, run
 from support import ISS_DG, scene
 from support.processes import heard, needs_posix
 from support.signals import BALL, WATCHDOG, begin, needs_linux, programs, wait_for

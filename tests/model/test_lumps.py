@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from supervessel import parse_scene, reference
+from supervessel.composite.inertia import Body, combine, combine_numbers
 from supervessel.equations import composite_at_start, equations
-from supervessel.inertia import Body, combine, combine_numbers
 from support import EPS
 from support.costs import operations, station
 

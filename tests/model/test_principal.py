@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from supervessel import principal as module
 from supervessel import reference
-from supervessel.inertia import from_upper_triangle, upper_triangle
-from supervessel.principal import TIE, principal, principal_forward, quaternion
+from supervessel.composite.inertia import from_upper_triangle, upper_triangle
+from supervessel.rotation.principal import TIE, principal, principal_forward, quaternion
 from support import EPS, random_rotation
 
 Array = NDArray[np.float64]

@@ -18,7 +18,7 @@ import numpy as np
 from run import build_host
 from vessels import VISIBLE, poses, time_composite, written
 
-from fmu_build.compiler import compile_library
+from fmu_build.compile.compiler import compile_library
 from fmu_build.platforms import host_platform
 from peers import version
 from supervessel import Scene, parse_scene, reference

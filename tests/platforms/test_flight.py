@@ -15,9 +15,9 @@ import pytest
 from fmpy import read_model_description
 
 from fmu_build import build_fmu
-from fmu_build.cache import cache_folder
-from fmu_build.compiler import FLAGS, fmi_headers
+from fmu_build.compile.compiler import FLAGS, fmi_headers
 from fmu_build.platforms import PLATFORMS, Platform, host_platform
+from fmu_build.storage.cache import cache_folder
 from support import ISS_DG, scene, variant
 
 pytestmark = pytest.mark.platforms

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from fmu_build import build_fmu
-from fmu_build.compiler import fmi_headers
+from fmu_build.compile.compiler import fmi_headers
+from fmu_build.generate.sources import LAYER
 from fmu_build.platforms import PLATFORMS
-from fmu_build.sources import LAYER
 from platforms.binaries import read_elf, read_macho, read_pe, read_universal, signed_pages
 from support import ISS_DG, scene
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import fmu_build.build
-from fmu_build.compiler import fmi_headers
+from fmu_build.compile.compiler import fmi_headers
 from fmu_build.platforms import Platform
 
 FLAGS = ("-std=c99", "-O1", "-g", "-w", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
@@ -25,7 +25,7 @@ def compile_binaries(  # noqa: PLR0917
     model_identifier: str,
     flags: Sequence[str] = (),
 ) -> dict[str, bytes]:
-    """Returns the library by archive path, as `fmu_build.compiler.compile_binaries` does for this machine.
+    """Returns the library by archive path, as `fmu_build.compile.compiler.compile_binaries` does for this machine.
 
     flags : of the other compiler, for naught
     """

@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 
-from fmu_build.compiler import fmi_headers
+from fmu_build.compile.compiler import fmi_headers
 from support import ISS_DG, built, variant
 
 pytestmark = pytest.mark.robustness

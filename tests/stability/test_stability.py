@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from fmpy import read_model_description
 
-from fmu_build.compiler import fmi_headers
+from fmu_build.compile.compiler import fmi_headers
 from fmu_build.platforms import host_platform
 from stability import truth
 from stability.flights import TEMPLATE, Craft, U, craft, one_tensor, single

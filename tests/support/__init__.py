@@ -19,9 +19,9 @@ from fmpy.fmi3 import FMU3Model, FMU3Slave
 
 from fmu_build import build_fmu
 from fmu_build.build import compile_sources, generate
-from fmu_build.compiler import FLAGS, TRIAL_FLAGS
+from fmu_build.compile.compiler import FLAGS, TRIAL_FLAGS
+from fmu_build.generate.sources import source_file_names, source_files
 from fmu_build.platforms import host_platform
-from fmu_build.sources import source_file_names, source_files
 from supervessel import Scene, parse_scene
 from support.traps import watch
 

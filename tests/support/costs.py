@@ -7,8 +7,8 @@ from typing import Any
 import casadi as ca
 
 from fmu_build.build import compile_sources, generate
+from fmu_build.generate.sources import source_file_names, source_files
 from fmu_build.platforms import PLATFORMS
-from fmu_build.sources import source_file_names, source_files
 from supervessel import Scene
 from supervessel.equations import equations
 from support import ISS_DG, body, variant

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from fmu_build.cache import OURS, cache_folder
+from fmu_build.storage.cache import OURS, cache_folder
 
 ROOT = Path(__file__).parents[2]
 

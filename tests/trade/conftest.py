@@ -2,7 +2,7 @@
 
 import pytest
 
-from supervessel.trade.flight import workshop
+from fmu_build.flight.flight import workshop
 from support.processes import cache
 
 __all__ = ["cache"]

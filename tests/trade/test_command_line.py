@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from supervessel.trade import table
+from fmu_build.trade import table
 from support import processes
 from support.processes import kept_in, needs_posix, run
 from support.signals import KEPT

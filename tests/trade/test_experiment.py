@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from fmu_build.flight.choices import Choice, Model, models, variant_of
+from fmu_build.flight.experiment import course_of, values
+from fmu_build.trade import TradeError
 from supervessel import SceneError, parse_scene
-from supervessel.trade import TradeError
-from supervessel.trade.choices import Choice, Model, models, variant_of
-from supervessel.trade.experiment import course_of, values
 from support import ISS_DG, variant
 
 RANGE = {"DG.mass": [11000.0, 24500.0]}

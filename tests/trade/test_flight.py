@@ -6,12 +6,12 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
-from fmu_build.compiler import FLAGS, compile_library
+from fmu_build.compile.compiler import FLAGS, compile_library
+from fmu_build.flight.choices import BEST, Choice, Model, models, reference_choices, variant_of
+from fmu_build.flight.experiment import course_of
+from fmu_build.flight.flight import HERE, fly_all, keep, place_of, read
 from fmu_build.platforms import host_platform
 from supervessel import parse_scene
-from supervessel.trade.choices import BEST, Choice, Model, models, reference_choices, variant_of
-from supervessel.trade.experiment import course_of
-from supervessel.trade.flight import HERE, fly_all, keep, place_of, read
 from support import ISS_DG, OK, Instance, variant
 
 COURSES = {

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from fmu_build.flight.choices import label
+from fmu_build.trade import drift_table
 from supervessel import load_scene, reference
-from supervessel.trade import drift_table
-from supervessel.trade.choices import label
 
 ROOT = Path(__file__).parents[2]
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from fmu_build.flight.choices import BEST, Choice, label
+from fmu_build.flight.experiment import course_of
+from fmu_build.flight.flight import fly_all
+from fmu_build.trade import TradeError, plot, study, table
 from supervessel import parse_scene, reference
-from supervessel.trade import TradeError, plot, study, table
-from supervessel.trade.choices import BEST, Choice, label
-from supervessel.trade.experiment import course_of
-from supervessel.trade.flight import fly_all
 from support import variant
 from support.processes import kept_in
 from support.series import flight, mp, norm

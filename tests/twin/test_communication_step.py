@@ -15,9 +15,9 @@ import supervessel
 from changes.test_docking import MIR
 from fmu_build import BuildError
 from fmu_build.build import generate
-from fmu_build.sources import LAYER
+from fmu_build.generate.sources import LAYER
 from supervessel import Twin
-from supervessel.control.functions import TwinFunction
+from supervessel.twin.functions import TwinFunction
 from support import EPS, ISS_DG, OK, Instance, body, scene, variant
 from twin.scenes import numbers, random_inputs, random_scene
 

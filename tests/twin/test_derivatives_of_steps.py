@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from supervessel import Twin
-from supervessel.control.plant import GAP
+from supervessel.twin.plant import GAP
 from support import ISS_DG, body, scene, variant
 
 H = 0.8  # s

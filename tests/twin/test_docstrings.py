@@ -14,7 +14,7 @@ import pytest
 import fmu_build
 import supervessel
 from supervessel import Twin, load_scene, reference
-from supervessel.control.functions import TwinFunction
+from supervessel.twin.functions import TwinFunction
 
 ROOT = Path(__file__).parents[2]
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from supervessel import Twin
-from supervessel.propagators.free_motion import FIRST_ANGLE, LARGEST_TURN
+from supervessel.rotation.propagators.free_motion import FIRST_ANGLE, LARGEST_TURN
 from support import EPS, ISS_DG, OK, body, flying, random_rotation, scene, variant
 
 Array = NDArray[np.float64]

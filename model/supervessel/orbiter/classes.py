@@ -8,8 +8,8 @@ from typing import Any
 
 from supervessel.orbiter.text import Place, ScenarioError, numbers, read_lines, unread
 from supervessel.problems import listed, printable, quantity, unknown
-from supervessel.quantities import is_number
-from supervessel.reading import ReadingError, read_toml
+from supervessel.scene.numbers import is_number
+from supervessel.shell.reading import ReadingError, read_toml
 
 TABLE_KEYS = (
     "empty_mass",

@@ -6,9 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from supervessel.consistency import direction_problems
 from supervessel.loading import parse_scene
-from supervessel.naming import MOST_VESSELS
 from supervessel.orbiter.classes import ClassPort, Library, VesselClass, find_class, read_library
 from supervessel.orbiter.docks import Mention, assemblies, docks, mentions
 from supervessel.orbiter.scenario import Entry, Scenario, Ship, read_scenario
@@ -16,8 +14,10 @@ from supervessel.orbiter.start import saved_motion, start_of
 from supervessel.orbiter.text import Note, ScenarioError, numbers
 from supervessel.orbiter.writing import Assembled, Member, Start, scene_text
 from supervessel.problems import SceneError, few_suggestions, listed, printable, quantity, unknown
-from supervessel.quantities import triangle_problem
-from supervessel.scene import Convention, Scene
+from supervessel.scene.consistency import direction_problems
+from supervessel.scene.names import MOST_VESSELS
+from supervessel.scene.numbers import triangle_problem
+from supervessel.scene.schema import Convention, Scene
 
 LEVEL = re.compile(r"(\d{1,4}):(\S+)", re.ASCII)
 ATTACHED = re.compile(r"\d+:\d+,(\S+)", re.ASCII)

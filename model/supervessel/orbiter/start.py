@@ -12,7 +12,7 @@ from supervessel.orbiter.scenario import Ship
 from supervessel.orbiter.text import Note, numbers
 from supervessel.orbiter.writing import Assembled, Start, identifiers
 from supervessel.problems import quantity
-from supervessel.scene import Scene
+from supervessel.scene.schema import Scene
 
 ROUNDED_POSITION = math.sqrt(3.0) * 0.005
 """Length [m] of what rounding to the second decimal, as Orbiter does, leaves of RPOS at most."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from supervessel.problems import LONGEST_PROBLEM, first, lines, printable
-from supervessel.reading import LARGEST_TEXT, ReadingError, read_text
+from supervessel.shell.reading import LARGEST_TEXT, ReadingError, read_text
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 

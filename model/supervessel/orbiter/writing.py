@@ -4,13 +4,13 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from supervessel.naming import DEVICE, IDENTIFIER, LONGEST_NAME, RESERVED
 from supervessel.orbiter.classes import ClassPort, VesselClass
 from supervessel.orbiter.docks import Mention
 from supervessel.orbiter.frames import mirrored
 from supervessel.orbiter.scenario import Scenario, Ship
 from supervessel.orbiter.text import Note
 from supervessel.problems import LONGEST_PROBLEM, printable, quantity
+from supervessel.scene.names import DEVICE, IDENTIFIER, LONGEST_NAME, RESERVED
 
 LONGEST_SCENE_NAME = 60
 """Letters of a scene's name, which becomes that of a library."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supervessel.scene import ORIGIN, Dock, Scene
+from supervessel.scene.schema import ORIGIN, Dock, Scene
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from supervessel.reference.assembly import Array, Points, composite, joined, motions, points, vector
 from supervessel.reference.rotation import angular_momentum, law_tensor
-from supervessel.scene import ORIGIN, Scene
+from supervessel.scene.schema import ORIGIN, Scene
 
 MASS_INPUTS = ("mass", "pmi")
 

@@ -14,7 +14,7 @@ from supervessel.reference.assembly import (
     points,
     vector,
 )
-from supervessel.scene import ORIGIN, VESSEL_OUTPUT_NAMES, Scene
+from supervessel.scene.schema import ORIGIN, VESSEL_OUTPUT_NAMES, Scene
 
 
 def rotation_matrix(attitude: ArrayLike) -> Array:

@@ -1,0 +1,200 @@
+"""The cheapest law and propagator by which a scene is as exact as `[accuracy]` asks, and what shows it."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from fmu_build.accuracy.flights import LONG, AccuracyError
+from fmu_build.accuracy.search import MARGIN, Progress, Search, Tried, begun
+from fmu_build.flight.choices import BEST, Choice, reference_choices
+from fmu_build.flight.flight import are_numbers, keep, place_of, read, workshop
+from supervessel.scene.schema import CHOSEN, Accuracy, Rotation, Scene
+
+CLAIM = (
+    "From the scene's start, in communication steps of that length, with inputs anywhere in their ranges and "
+    "held over each step, the error stays within what is asked up to the horizon: against the exact motion "
+    "under the law tensor with the same inputs. It is shown by flights, not proven."
+)
+
+NOT_COVERED = (
+    "another state at the start, other communication steps, a tolerance that an importer gives",
+    "model exchange, where the importer's solver integrates",
+    "what the law tensor itself leaves out: parts that bend, propellant that sloshes; errors of the inputs",
+    "inputs that make no sense in themselves, which the FMU discards",
+    "masses and poses that go to and fro, some keeping the rate and some the momentum, in just the order "
+    "that spins a body up with each round",
+)
+
+ABOUT = {
+    "asked, attitude, rate": "largest errors of the attitude [rad], of the rate [rad/s]; horizon, step: s",
+    "margin": "least of what is asked over the largest error in flight",
+    "doubt": "largest distance of the two ways to the exact motion, in truth",
+    "operations": "counted, of a communication step on an average over the flight in which it costs most",
+    "histories": "what inputs do in each flight",
+    "steps, looked_at": "communication steps of a flight, and at how many of their ends errors were taken",
+    "rows_drawn, rows_senseless": "values of all inputs that were drawn; those that the FMU discards",
+    "candidates": "in the order tried; one that is not enough, or refused, is broken off: flights says after "
+    "how many, worst names the history of its largest error",
+    "dearer": "not flown: this setting and any finer one take so many operations at least",
+    "max_angle_step": "rad",
+}
+
+
+COUNTS = ("steps", "looked_at", "rows_drawn", "rows_senseless")
+"""Keys of the evidence that are numbers of things."""
+
+
+def choose(scene: Scene, progress: Progress = lambda _: None) -> tuple[Scene, dict[str, Any]]:
+    """Returns the scene with law, propagator and setting that `[accuracy]` asks for, and the evidence.
+
+    The cheapest candidate, by counted operations, whose flights through histories of inputs keep the
+    accuracy with a margin: a dictionary says what was asked, flown and found. What has been found is kept
+    in the user's cache, and the same again is read from there. `build_fmu` and `Twin` choose by themselves.
+
+    scene    : with `[accuracy]`
+    progress : told what is being done
+    Raises ValueError for a scene without it, AccuracyError where nothing meets it, BuildError if the
+    compiler fails.
+
+    Example:
+        >>> from supervessel import choose, parse_scene
+        >>> ball = {"name": "ball", "root": "B", "vessels": {"B": {"mass": 1.0, "pmi": [1.0, 2.0, 2.0]}}}
+        >>> asked = {"accuracy": {"attitude": 1e-6, "horizon": 10.0, "step": 0.1}}
+        >>> spin = {"rotation": {"angular_velocity": [0.1, 0.0, 0.0]}}
+        >>> chosen, evidence = choose(parse_scene(ball | asked | spin))
+        >>> chosen.rotation.law, chosen.rotation.propagator
+        ('none', 'rk4')
+    """
+    accuracy = scene.accuracy
+    if accuracy is None:
+        raise ValueError(f'scene "{scene.name}" has no [accuracy]: nothing is to be chosen')
+    given = scene.rotation.model_dump(exclude_unset=True)
+    opened = {key: value for key, value in given.items() if key not in CHOSEN}
+    whole = scene.model_copy(update={"rotation": Rotation.model_validate(opened)})
+    place = place_of("accuracy", whole, "choice")
+    kept = read(place, lambda kept: _is_evidence(kept, whole, accuracy))
+    if kept is None:
+        kept = _chosen(whole, accuracy, progress)
+        keep(place, kept)
+    rotation = opened | kept["choice"]
+    if rotation["law"] == "none":  # keeps the rate always
+        rotation = {
+            key: value for key, value in rotation.items() if key not in ("mass_change", "pose_change")
+        }
+    chosen = Rotation.model_validate(rotation)
+    if scene.is_chosen and scene.rotation != chosen:
+        raise AccuracyError("accuracy: [rotation] has been changed since it was chosen")
+    return scene.model_copy(update={"rotation": chosen}), kept
+
+
+def _chosen(scene: Scene, accuracy: Accuracy, progress: Progress) -> dict[str, Any]:
+    """Returns the evidence. Raises AccuracyError where nothing meets what is asked."""
+    brief = accuracy.horizon <= LONG * accuracy.step
+    with workshop(trial=brief) as shop:
+        search = begun(scene, accuracy, shop, progress)
+        search.run()
+    best = search.best
+    if best is None:
+        raise AccuracyError(_refusal(search, accuracy))
+    course, (attitude, rate) = search.every.course, search.doubt
+    return {
+        "about": ABOUT,
+        "scene": scene.name,
+        "asked": accuracy.model_dump(mode="json"),
+        "claim": CLAIM,
+        "not_covered": list(NOT_COVERED),
+        "margin": MARGIN,
+        "choice": _settings(best.choice),
+        "attitude": _brief(best.attitude),
+        "rate": _brief(best.rate),
+        "operations": _brief(best.operations),
+        "histories": [history.name for history in search.every.flown],
+        "steps": course.steps,
+        "looked_at": len(course.sampled),
+        "rows_drawn": search.every.drawn,
+        "rows_senseless": search.every.senseless,
+        "truth": [str(choice) for choice in reference_choices(scene, BEST)],
+        "doubt": {"attitude": _brief(attitude.max()), "rate": _brief(rate.max())},
+        "candidates": [
+            _settings(one.choice)
+            | {
+                "operations": _brief(one.operations),
+                "attitude": None if one.refused else _brief(one.attitude),
+                "rate": None if one.refused else _brief(one.rate),
+                "worst": one.worst,
+                "flights": one.flights,
+                "refused": one.refused,
+                "enough": one.excess(accuracy) <= 1.0,
+            }
+            for one in search.tried.values()
+        ],
+        "dearer": [
+            _settings(choice) | {"operations": _brief(at_least)} for choice, at_least in search.left.values()
+        ],
+    }
+
+
+def _is_evidence(kept: Any, scene: Scene, accuracy: Accuracy) -> bool:
+    """Whether what JSON has given is evidence about this scene, in every part, for the choice in it.
+
+    Where a part is missing, or has another form, that may also show as an error.
+    """
+    opened = scene.rotation.model_dump(exclude_unset=True)
+    choice = kept["choice"]
+    chosen = [one for one in kept["candidates"] if choice.items() <= one.items()]
+    Rotation.model_validate(opened | choice)
+    texts = [*kept["histories"], *kept["truth"], *(one["worst"] for one in kept["candidates"])]
+    numbers = [kept[name] for name in ("attitude", "rate", "operations", *COUNTS)]
+    numbers += [kept["doubt"]["attitude"], kept["doubt"]["rate"]]
+    numbers += [one["operations"] for one in (*kept["candidates"], *kept["dearer"])]
+    for one in kept["candidates"]:
+        numbers += [one["flights"], *((one["attitude"], one["rate"]) if one["refused"] is None else ())]
+    for one in kept["dearer"]:
+        Rotation.model_validate({key: value for key, value in one.items() if key != "operations"})
+    return (
+        (kept["about"], kept["scene"], kept["claim"]) == (ABOUT, scene.name, CLAIM)
+        and (kept["not_covered"], kept["margin"]) == (list(NOT_COVERED), MARGIN)
+        and kept["asked"] == accuracy.model_dump(mode="json")
+        and [(one["enough"], one["refused"]) for one in chosen] == [(True, None)]
+        and are_numbers(numbers)
+        and all(isinstance(text, str) for text in texts)
+    )
+
+
+def _settings(choice: Choice) -> dict[str, Any]:
+    """Returns a choice as keys of [rotation]."""
+    return {"law": choice.model.law, "propagator": choice.propagator, **choice.settings}
+
+
+def _refusal(search: Search, accuracy: Accuracy) -> str:
+    """Returns why there is no choice, and the best that there is."""
+    nearest: Tried = min(search.tried.values(), key=lambda one: one.excess(accuracy))
+    asked = f"attitude = {accuracy.attitude} rad"
+    reached = f"{MARGIN * nearest.attitude:.2g} rad"
+    if accuracy.rate is not None:
+        asked += f", rate = {accuracy.rate} rad/s"
+        reached += f" and {MARGIN * nearest.rate:.2g} rad/s"
+    return (
+        f"accuracy: {asked} up to {accuracy.horizon:g} s: nothing meets it; the best is {reached}, a margin "
+        f"of {MARGIN:g} included, by {nearest.choice}"
+    )
+
+
+def _brief(value: float) -> float:
+    """Returns a number rounded to three digits: what is below differs between C libraries."""
+    return float(f"{value:.3g}")
+
+
+def said(evidence: Mapping[str, Any]) -> str:
+    """Returns in one line what was chosen."""
+    choice, asked = evidence["choice"], evidence["asked"]
+    settings = ", ".join(
+        f"{key} = {json.dumps(value) if isinstance(value, str) else f'{value:g}'}"
+        for key, value in choice.items()
+    )
+    found = f"{evidence['attitude']:.1e} rad of {asked['attitude']:g} rad"
+    if asked["rate"] is not None:
+        found += f", {evidence['rate']:.1e} rad/s of {asked['rate']:g} rad/s"
+    count = len(evidence["histories"])
+    flown = f"largest error in {count} flight{'s' * (count > 1)} of {asked['horizon']:g} s"
+    return f"{settings}: {flown} {found}"

@@ -1,0 +1,143 @@
+"""A scene's experiment as an importer flies it: steps, and the inputs that hold over each of them."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supervessel.problems import shown_message
+from supervessel.scene.schema import MOST_STEPS, Experiment, Scene
+
+Array = NDArray[np.float64]
+
+SLACK = 1e-9
+"""Of a step: so much nearer than a communication point counts as at it, for `k * step` is rounded."""
+
+SAMPLES = 100
+"""Communication points up to each horizon at which a flight is looked at."""
+
+HORIZONS = (100.0, 10.0, 1.0)
+"""What the duration is divided by for the times up to which errors are given."""
+
+ACTIONS = ("torque", "force")
+"""Last parts of the names of inputs that act."""
+
+
+class TradeError(RuntimeError):
+    """A trade that cannot be made; the message says why, in lines that can be shown."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(shown_message(message))
+
+
+@dataclass(frozen=True)
+class Course:
+    """An experiment step by step.
+
+    duration        : of the whole [s]
+    size, last_size : communication step [s], and the last one, which may be shorter
+    numbers         : values over each step, (n,), of those inputs that move, by name
+    booleans        : the same of docks, 0 and 1
+    sampled         : numbers of steps after which the flight is looked at, ascending, n last
+    """
+
+    duration: float
+    size: float
+    last_size: float
+    steps: int
+    numbers: dict[str, Array]
+    booleans: dict[str, Array]
+    sampled: NDArray[np.int64]
+
+    @property
+    def times(self) -> Array:
+        """Times [s] of the samples."""
+        return np.where(self.sampled == self.steps, self.duration, self.sampled * self.size)
+
+    @property
+    def horizons(self) -> list[float]:
+        """Times [s] up to which errors are given."""
+        return [self.duration / part for part in HORIZONS]
+
+
+def experiment_of(scene: Scene) -> Experiment:
+    """Returns the scene's experiment. Raises TradeError where it has none."""
+    if scene.experiment is None:
+        raise TradeError("experiment: missing; a trade needs [experiment] with duration and step [s]")
+    return scene.experiment
+
+
+def course_of(scene: Scene) -> Course:
+    """Returns the scene's experiment step by step. Raises TradeError if there is none, or too many steps."""
+    experiment = experiment_of(scene)
+    count = experiment.duration / experiment.step
+    if not count <= MOST_STEPS:
+        raise TradeError(
+            f"experiment: duration = {experiment.duration} s in steps of {experiment.step} s are {count:.6g} "
+            f"steps; at most {MOST_STEPS}"
+        )
+    steps = max(1, ceil(count - SLACK))
+    times: Array = experiment.step * np.arange(steps, dtype=np.float64)
+    slack = SLACK * experiment.step
+    last_size = experiment.duration - (steps - 1) * experiment.step
+    if abs(last_size - experiment.step) <= SLACK * experiment.step:
+        last_size = experiment.step
+    docks = {f"{name}.docked" for name in scene.inputs.docked}
+    moving = {name: rows for name, rows in experiment.inputs.items() if name not in docks}
+    switched = {name: rows for name, rows in experiment.inputs.items() if name in docks}
+    sampled: set[int] = set()
+    for part in HORIZONS:
+        sampled.update(np.rint(np.linspace(0.0, steps / part, SAMPLES + 1)).astype(int).tolist())
+    return Course(
+        experiment.duration,
+        experiment.step,
+        last_size,
+        steps,
+        {name: values(rows, times, slack) for name, rows in moving.items()},
+        {name: held(rows, times, slack) for name, rows in switched.items()},
+        np.array(sorted(sampled - {0})),
+    )
+
+
+def held(rows: Iterable[tuple[float, float]], times: Array, slack: float = 0.0) -> Array:
+    """Returns the last values at or before times, the first one before all; see `values`."""
+    when, what = np.array(list(rows)).T
+    place = np.searchsorted(when, times + slack, side="right") - 1
+    return np.asarray(what[np.maximum(place, 0)], dtype=float)
+
+
+def values(rows: Iterable[tuple[float, float]], times: Array, slack: float = 0.0) -> Array:
+    """Returns values at times, linear between rows; of two rows at one time the second holds from then on.
+
+    slack : [s], by which a time may be early and still counts as at a row
+    """
+    when, what = np.array(list(rows)).T
+    place = np.searchsorted(when, times + slack, side="right") - 1
+    one, other = np.maximum(place, 0), np.minimum(place + 1, len(when) - 1)
+    span = when[other] - when[one]
+    past = np.maximum(times - when[one], 0.0)
+    share = np.where(span > 0.0, past / np.where(span > 0.0, span, 1.0), 0.0)
+    return np.asarray(what[one] + share * (what[other] - what[one]), dtype=float)
+
+
+def at_start(scene: Scene) -> dict[str, float]:
+    """Returns the values at time 0 of the inputs that the experiment names."""
+    return {name: rows_at_start(rows) for name, rows in experiment_of(scene).inputs.items()}
+
+
+def rows_at_start(rows: Iterable[tuple[float, float]]) -> float:
+    """Returns the value at time 0."""
+    return float(values(rows, np.zeros(1))[0])
+
+
+def acts(scene: Scene) -> bool:
+    """Whether a torque or force other than 0 acts at some time."""
+    named = experiment_of(scene).inputs.items()
+    return any(
+        value != 0.0
+        for name, rows in named
+        if name.rpartition(".")[2].partition("[")[0] in ACTIONS
+        for _, value in rows
+    )

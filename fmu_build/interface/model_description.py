@@ -1,0 +1,281 @@
+"""modelDescription.xml for FMI 2.0 and FMI 3.0, written from the variable table."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from math import degrees
+from xml.etree import ElementTree as ET
+
+from fmu_build.interface.variable_table import Dependency, Entry, Role
+from fmu_build.interface.xml_text import xml_text
+from supervessel.scene.schema import Scene
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit: exponents of the SI base units in FMI's order, and the quantity measured in it."""
+
+    exponents: dict[str, int]
+    type_name: str
+    quantity: str
+    display: tuple[str, float] | None = None
+
+
+UNITS = {
+    "": Unit({}, "Ratio", "Ratio"),
+    "s": Unit({"s": 1}, "Time", "Time"),
+    "1/s": Unit({"s": -1}, "QuaternionRate", "Frequency"),
+    "kg": Unit({"kg": 1}, "Mass", "Mass"),
+    "m": Unit({"m": 1}, "Length", "Length"),
+    "m/s": Unit({"m": 1, "s": -1}, "Velocity", "Velocity"),
+    "m2": Unit({"m": 2}, "SpecificMoment", "MassNormalisedMomentOfInertia"),
+    "rad": Unit({"rad": 1}, "Angle", "Angle", ("deg", degrees(1.0))),
+    "rad/s": Unit({"s": -1, "rad": 1}, "AngularVelocity", "AngularVelocity", ("deg/s", degrees(1.0))),
+    "rad/s2": Unit(
+        {"s": -2, "rad": 1}, "AngularAcceleration", "AngularAcceleration", ("deg/s2", degrees(1.0))
+    ),
+    "N": Unit({"kg": 1, "m": 1, "s": -2}, "Force", "Force"),
+    "N.m": Unit({"kg": 1, "m": 2, "s": -2}, "Torque", "Torque"),
+    "kg.m2": Unit({"kg": 1, "m": 2}, "MomentOfInertia", "MomentOfInertia"),
+    "J": Unit({"kg": 1, "m": 2, "s": -2}, "Energy", "Energy"),
+    "N.m.s": Unit({"kg": 1, "m": 2, "s": -1}, "AngularMomentum", "AngularMomentum"),
+}
+
+LOG_CATEGORIES = {
+    "logStatusDiscard": "a value or a step was refused; the instance is as it was before the call",
+    "logStatusError": "a rule of the standard was broken; the instance is terminated",
+    "logComposite": "the composite was computed because one of its inputs changed",
+    "logAll": "all of these",
+}
+
+ROLES: dict[Role, dict[str, str]] = {
+    "time": {"causality": "independent", "variability": "continuous"},
+    "input": {"causality": "input", "variability": "continuous"},
+    "parameter": {"causality": "parameter", "variability": "fixed", "initial": "exact"},
+    "output": {"causality": "output", "variability": "continuous", "initial": "calculated"},
+    "state": {"causality": "local", "variability": "continuous", "initial": "calculated"},
+    "derivative": {"causality": "local", "variability": "continuous", "initial": "calculated"},
+}
+
+COMMON_CAPABILITIES_2 = {
+    "canNotUseMemoryManagementFunctions": "true",
+    "canGetAndSetFMUstate": "true",
+    "canSerializeFMUstate": "true",
+    "providesDirectionalDerivative": "true",
+}
+
+COMMON_CAPABILITIES_3 = {
+    "canGetAndSetFMUState": "true",
+    "canSerializeFMUState": "true",
+    "providesDirectionalDerivatives": "true",
+    "providesAdjointDerivatives": "true",
+}
+
+
+def model_description(
+    scene: Scene, entries: Sequence[Entry], token: str, fmi: int, sources: Sequence[str] = ()
+) -> bytes:
+    """Returns the text of modelDescription.xml.
+
+    entries : the variable table
+    token   : instantiation token, the same that is compiled into the library
+    fmi     : 2 or 3
+    sources : names of the C files in sources/, which FMI 2.0 lists here
+    """
+    root = _fmi3(scene, entries, token) if fmi == 3 else _fmi2(scene, entries, token, sources)
+    return xml_text(root)
+
+
+def _header(scene: Scene, fmi_version: str, token_attribute: str, token: str) -> ET.Element:
+    """Returns the root element."""
+    attributes = {
+        "fmiVersion": fmi_version,
+        "modelName": scene.name,
+        token_attribute: token,
+        "description": _description(scene),
+        "generationTool": f"supervessel {version('supervessel')}",
+        "variableNamingConvention": "structured",
+    }
+    if fmi_version == "2.0":
+        attributes["numberOfEventIndicators"] = "0"
+    return ET.Element("fmiModelDescription", attributes)
+
+
+def _description(scene: Scene) -> str:
+    others = [name for name in scene.vessels if name != scene.root]
+    how = "docked, now and then" if scene.inputs.docked else "docked"
+    docked = (
+        f" with {', '.join(others[:8])}{' and others' if len(others) > 8 else ''} {how}" if others else ""
+    )
+    return f"Rotation of {scene.root}{docked}, law {scene.rotation.law}"
+
+
+def _fmi3(scene: Scene, entries: Sequence[Entry], token: str) -> ET.Element:
+    root = _header(scene, "3.0", "instantiationToken", token)
+    identifier = {"modelIdentifier": scene.name}
+    ET.SubElement(root, "ModelExchange", identifier | COMMON_CAPABILITIES_3)
+    stepping = {
+        "canHandleVariableCommunicationStepSize": "true",
+        "maxOutputDerivativeOrder": "1",
+        "providesIntermediateUpdate": "true",
+        "canReturnEarlyAfterIntermediateUpdate": "true",
+    }
+    if scene.inputs.docked:
+        stepping["hasEventMode"] = "true"
+    ET.SubElement(root, "CoSimulation", identifier | COMMON_CAPABILITIES_3 | stepping)
+    _units(root, entries)
+    _types(root, entries, "Float64Type")
+    _log_categories(root)
+    _experiment(root, scene)
+    variables = ET.SubElement(root, "ModelVariables")
+    for entry in entries:
+        attributes = _identity(entry) | _role(entry)
+        if entry.role == "output":
+            attributes["intermediateUpdate"] = "true"
+        if entry.role == "derivative":
+            attributes["derivative"] = str(_state_of(entry, entries).reference)
+        kind = "Boolean" if entry.variable.boolean else "Float64"
+        ET.SubElement(variables, kind, attributes | _type_attributes(entry))
+    structure = ET.SubElement(root, "ModelStructure")
+    for entry in _of(entries, "output"):
+        _unknown3(structure, "Output", entry, entry.dependencies)
+    for entry in _of(entries, "derivative"):
+        _unknown3(structure, "ContinuousStateDerivative", entry, entry.dependencies)
+    for entry in _of(entries, "output", "state", "derivative"):
+        _unknown3(structure, "InitialUnknown", entry, entry.initial)
+    return root
+
+
+def _fmi2(scene: Scene, entries: Sequence[Entry], token: str, sources: Sequence[str]) -> ET.Element:
+    root = _header(scene, "2.0", "guid", token)
+    identifier = {"modelIdentifier": scene.name}
+    exchange = {"completedIntegratorStepNotNeeded": "true"}
+    stepping = {"canHandleVariableCommunicationStepSize": "true", "maxOutputDerivativeOrder": "1"}
+    for name, capabilities in (("ModelExchange", exchange), ("CoSimulation", stepping)):
+        interface = ET.SubElement(root, name, identifier | capabilities | COMMON_CAPABILITIES_2)
+        if sources:
+            files = ET.SubElement(interface, "SourceFiles")
+            for source in sources:
+                ET.SubElement(files, "File", name=source)
+    _units(root, entries)
+    _types(root, entries, "SimpleType")
+    _log_categories(root)
+    _experiment(root, scene)
+    variables = ET.SubElement(root, "ModelVariables")
+    for entry in entries:
+        element = ET.SubElement(variables, "ScalarVariable", _identity(entry) | _role(entry))
+        attributes = _type_attributes(entry)
+        if entry.role == "derivative":  # FMI 2.0 counts variables from 1
+            attributes["derivative"] = str(_state_of(entry, entries).reference + 1)
+        ET.SubElement(element, "Boolean" if entry.variable.boolean else "Real", attributes)
+    structure = ET.SubElement(root, "ModelStructure")
+    for name, roles in (
+        ("Outputs", ("output",)),
+        ("Derivatives", ("derivative",)),
+        ("InitialUnknowns", ("output", "state", "derivative")),
+    ):
+        element = ET.SubElement(structure, name)
+        for entry in _of(entries, *roles):
+            dependencies = entry.initial if name == "InitialUnknowns" else entry.dependencies
+            attributes = {"index": str(entry.reference + 1)} | _dependencies(dependencies, 1)
+            ET.SubElement(element, "Unknown", attributes)
+    return root
+
+
+def _of(entries: Sequence[Entry], *roles: Role) -> list[Entry]:
+    return [entry for entry in entries if entry.role in roles]
+
+
+def _state_of(derivative: Entry, entries: Sequence[Entry]) -> Entry:
+    """Returns the state that a derivative is the rate of."""
+    return next(entry for entry in entries if f"der({entry.variable.name})" == derivative.variable.name)
+
+
+def _unknown3(structure: ET.Element, name: str, entry: Entry, dependencies: Sequence[Dependency]) -> None:
+    attributes = {"valueReference": str(entry.reference)} | _dependencies(dependencies)
+    ET.SubElement(structure, name, attributes)
+
+
+def _dependencies(dependencies: Sequence[Dependency], offset: int = 0) -> dict[str, str]:
+    return {
+        "dependencies": " ".join([str(d.reference + offset) for d in dependencies]),
+        "dependenciesKind": " ".join([d.kind for d in dependencies]),
+    }
+
+
+def _units(root: ET.Element, entries: Sequence[Entry]) -> None:
+    used = {entry.variable.unit for entry in entries}
+    definitions = ET.SubElement(root, "UnitDefinitions")
+    for name, unit in UNITS.items():
+        if name and name in used:
+            element = ET.SubElement(definitions, "Unit", name=name)
+            ET.SubElement(element, "BaseUnit", {base: str(power) for base, power in unit.exponents.items()})
+            if unit.display:
+                display, factor = unit.display
+                ET.SubElement(element, "DisplayUnit", name=display, factor=repr(factor))
+
+
+def _types(root: ET.Element, entries: Sequence[Entry], tag: str) -> None:
+    """Writes the declared types; FMI 2.0 nests the attributes in an element of their own."""
+    used = {entry.variable.unit for entry in entries}
+    definitions = ET.SubElement(root, "TypeDefinitions")
+    for name, unit in UNITS.items():
+        if name not in used:
+            continue
+        attributes = {"quantity": unit.quantity}
+        if name:
+            attributes["unit"] = name
+        if unit.display:
+            attributes["displayUnit"] = unit.display[0]
+        if tag == "SimpleType":
+            ET.SubElement(ET.SubElement(definitions, tag, name=unit.type_name), "Real", attributes)
+        else:
+            ET.SubElement(definitions, tag, {"name": unit.type_name} | attributes)
+
+
+def _log_categories(root: ET.Element) -> None:
+    categories = ET.SubElement(root, "LogCategories")
+    for name, description in LOG_CATEGORIES.items():
+        ET.SubElement(categories, "Category", name=name, description=description)
+
+
+def _experiment(root: ET.Element, scene: Scene) -> None:
+    if scene.experiment is not None:
+        ET.SubElement(
+            root,
+            "DefaultExperiment",
+            startTime="0.0",
+            stopTime=repr(scene.experiment.duration),
+            tolerance=repr(scene.rotation.tolerance),
+            stepSize=repr(scene.experiment.step),
+        )
+
+
+def _identity(entry: Entry) -> dict[str, str]:
+    return {
+        "name": entry.variable.name,
+        "valueReference": str(entry.reference),
+        "description": entry.variable.description,
+    }
+
+
+def _role(entry: Entry) -> dict[str, str]:
+    """Returns causality, variability and initial of a variable."""
+    return ROLES[entry.role] | ({"variability": "discrete"} if entry.variable.boolean else {})
+
+
+def _type_attributes(entry: Entry) -> dict[str, str]:
+    """Returns type, unit, range and start of a variable, as both versions of FMI write them."""
+    variable = entry.variable
+    if variable.boolean:
+        return {"start": "true" if variable.start else "false"}
+    unit = UNITS[variable.unit]
+    attributes = {"declaredType": unit.type_name}
+    if variable.unit:
+        attributes["unit"] = variable.unit
+    if unit.display:
+        attributes["displayUnit"] = unit.display[0]
+    numbers = {"min": variable.low, "max": variable.high, "start": variable.start}
+    if variable.nominal != 1.0:
+        numbers["nominal"] = variable.nominal
+    return attributes | {name: repr(number) for name, number in numbers.items() if number is not None}

@@ -1,0 +1,220 @@
+"""terminalsAndIcons.xml: which variables belong together in a connection, and the icons that stand for them.
+
+FMI 3.0 defines the file; FMI 2.0.4 and later take it as it is.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, pi, sin
+from xml.etree import ElementTree as ET
+
+from fmu_build.interface.variable_table import Entry
+from fmu_build.interface.xml_text import xml_text
+from supervessel.drawing.figure import Figure, Item, Path, arrow, regular_polygon, svg
+from supervessel.drawing.raster import png
+from supervessel.scene.schema import Scene
+
+FILE_VERSION = {2: "3.0", 3: "3.0"}
+"""The file's fmiVersion by that of the FMU: the version that defines the file."""
+
+POSE = ("position", "direction", "alignment")
+MOTION = ("velocity", "rate")
+
+ICON_EXTENT = 100.0
+"""The FMU's icon fills the square from -100 to 100, the coordinates that FMI takes by default."""
+TERMINAL_SIZE = 24.0  # in the same coordinates
+TERMINAL_ICON_SIZE = 64  # px
+CONNECTION_COLOUR = "34 34 34"
+
+
+@dataclass(frozen=True)
+class Terminal:
+    """Variables that are connected together.
+
+    kind    : what they are; a terminal of this kind of another model fits. It names the icon file too.
+    rule    : "plug" where all members are needed, "bus" where some do
+    prefix  : what the members' names leave out of the variables' names
+    """
+
+    name: str
+    kind: str
+    rule: str
+    description: str
+    members: Sequence[Entry]
+    prefix: str = ""
+
+    @property
+    def is_input(self) -> bool:
+        """Whether the FMU takes these variables."""
+        return all(entry.role == "input" for entry in self.members)
+
+
+def terminals(scene: Scene, entries: Sequence[Entry]) -> list[Terminal]:
+    """Returns the terminals of a scene: ports whose pose is an input, docks, forces, torques, attitude."""
+
+    by_group: dict[tuple[str, str], list[Entry]] = {}
+    for entry in entries:
+        by_group.setdefault((entry.role, entry.variable.group), []).append(entry)
+
+    def members_of(role: str, *groups: str) -> list[Entry]:
+        """Returns the variables of a role whose group is among these, in the table's order."""
+        members = [entry for group in groups for entry in by_group.get((role, group), ())]
+        return sorted(members, key=lambda entry: entry.reference)
+
+    def inputs(owner: str, kind: str, description: str, *parts: str, name: str = "") -> Terminal:
+        members = members_of("input", *(f"{owner}.{part}" for part in parts))
+        return Terminal(name or owner, kind, "plug", description, members, prefix=f"{owner}.")
+
+    found = []
+    for port in scene.inputs.pose:
+        place = f"of docking port {port} in the axes of {port.partition('.')[0]}"
+        if port in scene.inputs.motion:
+            found.append(inputs(port, "port_motion", f"pose and motion {place}", *POSE, *MOTION))
+        else:
+            found.append(inputs(port, "port_pose", f"pose {place}", *POSE))
+    for dock in scene.inputs.docked:
+        ports = " and ".join(scene.dock(dock).ports)
+        found.append(
+            inputs(dock, "dock", f"whether {ports} are docked, motion at contact", "docked", *MOTION)
+        )
+    for point in scene.inputs.force:
+        found.append(inputs(point, "force", f"external force at {point}, axes of its vessel", "force"))
+    for vessel in scene.inputs.vessel_torque:
+        what = f"external torque on {vessel}, its axes"
+        found.append(inputs(vessel, "torque", what, "torque", name=f"{vessel}.torque"))
+    torque = members_of("input", "torque")
+    attitude = members_of("output", "attitude", "angular_velocity")
+    found.append(
+        Terminal("torque", "torque", "plug", "external torque about the barycentre, body axes", torque)
+    )
+    found.append(
+        Terminal("attitude", "attitude", "bus", "attitude and angular velocity of the body", attitude)
+    )
+    return [terminal for terminal in found if terminal.members]
+
+
+def terminals_and_icons(scene: Scene, entries: Sequence[Entry], fmi: int) -> bytes:
+    """Returns the text of terminalsAndIcons/terminalsAndIcons.xml.
+
+    entries : the variable table
+    fmi     : version of the FMU, 2 or 3
+    """
+    root = ET.Element("fmiTerminalsAndIcons", fmiVersion=FILE_VERSION[fmi])
+    graphics = ET.SubElement(root, "GraphicalRepresentation")
+    extent = {"x1": -ICON_EXTENT, "y1": -ICON_EXTENT, "x2": ICON_EXTENT, "y2": ICON_EXTENT}
+    corners = {name: repr(value) for name, value in extent.items()}
+    ET.SubElement(graphics, "CoordinateSystem", corners | {"suggestedScalingFactorTo_mm": "0.1"})
+    ET.SubElement(graphics, "Icon", corners)
+    found = terminals(scene, entries)
+    if found:
+        parent = ET.SubElement(root, "Terminals")
+        for side, members in (
+            (-1.0, [t for t in found if t.is_input]),
+            (1.0, [t for t in found if not t.is_input]),
+        ):
+            for place, terminal in enumerate(members):
+                _write(parent, terminal, side, place, len(members))
+    return xml_text(root)
+
+
+def terminal_icons(scene: Scene, entries: Sequence[Entry]) -> dict[str, bytes]:
+    """Returns the image files that terminalsAndIcons.xml names, by their place in the archive."""
+    files = {}
+    for kind in sorted({terminal.kind for terminal in terminals(scene, entries)}):
+        figure = Figure(TERMINAL_ICON_SIZE, TERMINAL_ICON_SIZE, kind.replace("_", " "), ICONS[kind])
+        files[f"terminalsAndIcons/{kind}.png"] = png(figure)
+        files[f"terminalsAndIcons/{kind}.svg"] = svg(figure).encode()
+    return files
+
+
+def _write(parent: ET.Element, terminal: Terminal, side: float, place: int, count: int) -> None:
+    """Writes a terminal; it stands on the left (`side` -1) or right edge of the icon, one below the other."""
+    element = ET.SubElement(
+        parent,
+        "Terminal",
+        name=terminal.name,
+        matchingRule=terminal.rule,
+        terminalKind=f"_supervessel_{terminal.kind}",
+        description=terminal.description,
+    )
+    for entry in terminal.members:
+        name = entry.variable.name
+        attributes = {
+            "variableName": name,
+            "memberName": name.removeprefix(terminal.prefix),
+            "variableKind": "signal",
+        }
+        ET.SubElement(element, "TerminalMemberVariable", attributes)
+    spacing = 2.0 * ICON_EXTENT / count
+    half = min(TERMINAL_SIZE, 0.9 * spacing) / 2.0
+    x, y = side * (ICON_EXTENT + half), ICON_EXTENT - spacing * (place + 0.5)
+    box = {"x1": x - half, "y1": y - half, "x2": x + half, "y2": y + half}
+    ET.SubElement(
+        element,
+        "TerminalGraphicalRepresentation",
+        {
+            "defaultConnectionColor": CONNECTION_COLOUR,
+            **{corner: repr(round(value, 6)) for corner, value in box.items()},
+            "iconBaseName": terminal.kind,
+        },
+    )
+
+
+def _port_icon() -> list[Item]:
+    """Returns a docking port: its face, an arrow outwards, a tick along the alignment."""
+    return [
+        Path(((22.0, 10.0), (22.0, 54.0)), stroke="#0072b2", width=6.0),
+        Path(((22.0, 32.0), (22.0, 12.0)), stroke="#d55e00", width=6.0),
+        *arrow((22.0, 32.0), (58.0, 32.0), "#222222", width=4.0, head=14.0),
+        Path(regular_polygon((22.0, 32.0), 6.0, 16), fill="#222222", closed=True),
+    ]
+
+
+def _dock_icon() -> list[Item]:
+    """Returns two docking ports, face to face."""
+    return [
+        Path(((26.0, 12.0), (26.0, 52.0)), stroke="#0072b2", width=6.0),
+        Path(((38.0, 12.0), (38.0, 52.0)), stroke="#d55e00", width=6.0),
+        *arrow((4.0, 32.0), (22.0, 32.0), "#222222", width=4.0, head=12.0),
+        *arrow((60.0, 32.0), (42.0, 32.0), "#222222", width=4.0, head=12.0),
+    ]
+
+
+def _force_icon() -> list[Item]:
+    """Returns an arrow from a point."""
+    return [
+        *arrow((12.0, 52.0), (54.0, 10.0), "#222222", width=5.0, head=18.0),
+        Path(regular_polygon((12.0, 52.0), 7.0, 16), fill="#d55e00", closed=True),
+    ]
+
+
+def _torque_icon() -> list[Item]:
+    """Returns an arrow around an axis."""
+    angles = [2.4 + 1.5 * pi * i / 24 for i in range(25)]
+    circle = tuple((32.0 + 20.0 * cos(a), 32.0 + 20.0 * sin(a)) for a in angles)
+    return [
+        Path(circle, stroke="#222222", width=4.0),
+        *arrow(circle[-2], (circle[-1][0] + 2.0, circle[-1][1] + 9.0), "#222222", width=4.0, head=14.0),
+        Path(regular_polygon((32.0, 32.0), 5.0, 16), fill="#d55e00", closed=True),
+    ]
+
+
+def _attitude_icon() -> list[Item]:
+    """Returns the three axes of a body."""
+    ends = ((58.0, 47.0), (32.0, 5.0), (6.0, 47.0))
+    colours = ("#b00000", "#007000", "#0000b0")
+    return [
+        item
+        for end, colour in zip(ends, colours, strict=True)
+        for item in arrow((32.0, 34.0), end, colour, width=4.0, head=13.0)
+    ]
+
+
+ICONS = {
+    "port_pose": _port_icon(),
+    "port_motion": _port_icon(),
+    "dock": _dock_icon(),
+    "force": _force_icon(),
+    "torque": _torque_icon(),
+    "attitude": _attitude_icon(),
+}

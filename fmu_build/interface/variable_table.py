@@ -1,0 +1,192 @@
+"""The FMU's variable table: the model's variables in order, with value references and dependencies.
+
+The modelDescription.xml and the C layer are both written from it.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence, Set
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import casadi as ca
+
+from fmu_build.generate.vessel_loop import LONGEST_CODE
+from supervessel.equations import Equations
+from supervessel.scene.schema import Scene, keeps_momentum
+from supervessel.scene.variables import (
+    Variable,
+    derivative_variables,
+    input_variables,
+    output_variables,
+    parameter_variables,
+    state_variables,
+)
+
+Role = Literal["time", "input", "parameter", "output", "state", "derivative"]
+Kind = Literal["constant", "dependent"]
+
+
+@dataclass(frozen=True)
+class Dependency:
+    """What a variable depends on: a value reference, and how; "constant" is linear with a fixed factor."""
+
+    reference: int
+    kind: Kind
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A variable of the FMU.
+
+    reference    : value reference, the variable's place in the table
+    dependencies : inputs and states that an output or a derivative depends on
+    initial      : inputs and start parameters that an output, a state or a derivative depends on at the start
+    """
+
+    variable: Variable
+    reference: int
+    role: Role
+    dependencies: tuple[Dependency, ...] = ()
+    initial: tuple[Dependency, ...] = ()
+
+
+Rows = dict[Role, list[tuple[Dependency, ...]]]
+"""Dependencies of each variable of a role."""
+
+TIME = Variable("time", "s", "simulation time")
+
+
+def variable_table(scene: Scene, model: Equations) -> tuple[Entry, ...]:
+    """Returns the variables: time, inputs (p, then torque), start parameters, outputs, states, rates."""
+    groups: dict[Role, Sequence[Variable]] = {
+        "time": (TIME,),
+        "input": input_variables(scene),
+        "parameter": parameter_variables(scene),
+        "output": output_variables(scene),
+        "state": state_variables(scene),
+        "derivative": derivative_variables(scene),
+    }
+    first: dict[Role, int] = {}
+    count = 0
+    for role, variables in groups.items():
+        first[role] = count
+        count += len(variables)
+    knowns = [*range(first["state"], first["state"] + 7)]
+    inputs = list(enumerate(input_variables(scene), start=first["input"]))
+    knowns += [reference for reference, variable in inputs if variable.part != "contact"]
+    booleans = frozenset(reference for reference, variable in inputs if variable.boolean)
+    by_role, at_start = _dependencies(scene, model, knowns, booleans)
+    entries = []
+    for role, variables in groups.items():
+        for i, variable in enumerate(variables):
+            now = by_role[role][i] if role in by_role else ()
+            start = at_start[role][i] if role in at_start else ()
+            initial = _at_start(start, first["state"], first["parameter"])
+            entries.append(Entry(variable, first[role] + i, role, now, initial))
+    return tuple(entries)
+
+
+def _dependencies(
+    scene: Scene, model: Equations, knowns: Sequence[int], booleans: Set[int]
+) -> tuple[Rows, Rows]:
+    """Returns the dependencies of outputs and derivatives on states and inputs; and at the start those of
+    states, too, on attitude and angular velocity, which stand for the states then, and on inputs.
+
+    knowns   : value references of states and inputs (p, u); the motion with which a part docks acts at that
+               instant alone
+    booleans : those of Booleans among them
+    """
+    p, u, z = (ca.SX.sym(*s) for s in (("p", len(model.p_names)), ("u", len(model.u_names)), ("z", 7)))
+    c = model.composite(p)
+    # principal moments and axes follow from every element of the inertia, and not linearly
+    a = ca.repmat(ca.sumsqr(c[model.slices["inertia"]]), model.axes.numel_out(0))
+    known = ca.vertcat(z, p, u)
+    rows_of = _rows if model.composite.n_instructions() <= LONGEST_CODE else _rows_by_structure
+
+    def rows(unknowns: Mapping[Role, ca.SX]) -> Rows:
+        return {role: rows_of(unknown, known, knowns, booleans) for role, unknown in unknowns.items()}
+
+    follows = _after_change(scene, model, z, p, c)
+    now = rows(
+        {"output": model.state_outputs(follows, u, c, a, 0.0), "derivative": model.state_ode(follows, u, c)}
+    )
+    if model.change is None:
+        return now, now | rows({"state": z})
+    begun = ca.vertcat(z[:4], model.change.momentum_of(z[4:], c)) if keeps_momentum(scene) else z
+    rate = ca.vertcat(model.ode(z, u, c)[:4], model.state_ode(begun, u, c)[4:])
+    return now, rows({"output": model.outputs(z, u, c, a, 0.0), "derivative": rate, "state": begun})
+
+
+def _after_change(scene: Scene, model: Equations, z: ca.SX, p: ca.SX, c: ca.SX) -> ca.SX:
+    """Returns what stands for the states after a change of inputs: its structure tells what they follow from.
+
+    A state that is the angular momentum is what a change of mass or pose keeps. An angular velocity jumps by
+    what follows from the inputs as they were and are; a dock that opens or closes makes either one jump.
+    """
+    if model.change is None:
+        return z
+    rate = z[4:]
+    if "momentum" in scene.keeps.values() and not keeps_momentum(scene):
+        rate += model.change.keep_momentum(ca.SX.sym("kept", 3), ca.SX.sym("before", c.numel()), c)
+    flags = [
+        flag for name, flag in zip(model.p_names, ca.vertsplit(p), strict=True) if name.endswith(".docked")
+    ]
+    return ca.vertcat(z[:4], rate + sum(flags, ca.SX(0)))
+
+
+def _rows(
+    unknown: ca.SX, known: ca.SX, knowns: Sequence[int], booleans: Set[int]
+) -> list[tuple[Dependency, ...]]:
+    """Returns the dependencies that the structure of a Jacobian shows, row by row.
+
+    A choice by a Boolean has no derivative: there it is the structure of the expression that counts.
+    """
+    jacobian = ca.jacobian(unknown, known)
+    rows: list[list[Dependency]] = [[] for _ in range(jacobian.size1())]
+    for row, column in zip(*ca.jacobian_sparsity(unknown, known).get_triplet(), strict=True):
+        element = jacobian[row, column]
+        if knowns[column] in booleans:
+            rows[row].append(Dependency(knowns[column], "dependent"))
+        elif not element.is_zero():
+            rows[row].append(Dependency(knowns[column], "constant" if element.is_constant() else "dependent"))
+    return [tuple(sorted(row, key=lambda d: d.reference)) for row in rows]
+
+
+def _rows_by_structure(
+    unknown: ca.SX, known: ca.SX, knowns: Sequence[int], booleans: Set[int]
+) -> list[tuple[Dependency, ...]]:
+    """Returns dependencies, row by row, none of which is said to be constant.
+
+    For composites so long that their Jacobian would take more than all the rest of a build.
+    """
+    sparsity = ca.jacobian_sparsity(unknown, known).T  # of a sparsity all of a column stands together
+    dependent = [Dependency(reference, "dependent") for reference in knowns]
+    order = sorted(range(len(knowns)), key=knowns.__getitem__)
+    columns, ends = sparsity.row(), sparsity.colind()
+    rows = []
+    for begin, end in pairwise(ends):
+        held = set(columns[begin:end])
+        rows.append(tuple(dependent[column] for column in order if column in held))
+    return rows
+
+
+def _at_start(now: Iterable[Dependency], first_state: int, first_parameter: int) -> tuple[Dependency, ...]:
+    """Returns dependencies with attitude and rate replaced by the start parameters that they follow from.
+
+    The attitude follows from all four of attitude_start, which are normalised, the rate from its own element.
+    """
+    rates, attitude = (
+        range(first_parameter, first_parameter + 3),
+        range(first_parameter + 3, first_parameter + 7),
+    )
+    parameters: dict[int, Dependency] = {}
+    others = []
+    for dependency in now:
+        state = dependency.reference - first_state
+        if not 0 <= state < 7:
+            others.append(dependency)
+        elif state < 4:
+            parameters |= {reference: Dependency(reference, "dependent") for reference in attitude}
+        else:
+            parameters[rates[state - 4]] = Dependency(rates[state - 4], dependency.kind)
+    return tuple(sorted([*others, *parameters.values()], key=lambda dependency: dependency.reference))

@@ -1,0 +1,401 @@
+"""What is kept from one run to the next: what compilers have made, sources that they compile, results.
+
+All of it is in supervessel-N (N: version of this layout) below the user's cache folder, or below the folder
+that SUPERVESSEL_CACHE names. In it are generations: the newest is in use, and when it has grown large
+another begins; an older one is removed whole when nobody has used it for an hour. Nothing outside of
+supervessel-N is ever removed, and nothing by way of a link.
+
+Who can write into a cache can have anything compiled or believed. So a cache in a folder that others may
+write, or that belongs to another user, is left unused. That goes by owners and permissions as POSIX has them;
+on Windows, where the user's cache folder is closed to others by inheritance, they are not looked at.
+"""
+
+import errno
+import functools
+import os
+import re
+import shutil
+import stat
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from hashlib import sha256
+from pathlib import Path
+
+from fmu_build.errors import BuildError
+from fmu_build.storage.temporary import folder_of_program, is_own, is_own_folder
+from supervessel.problems import printable
+
+LAYOUT = 1
+"""Version of what is where; counted up whenever that changes."""
+
+OURS = f"supervessel-{LAYOUT}"
+
+TAG = "CACHEDIR.TAG"
+
+TAG_TEXT = b"""\
+Signature: 8a477f597d28d172789f06886806bc55
+# This folder is a cache made by supervessel; see https://bford.info/cachedir/
+# `supervessel cache --clear` removes it.
+"""
+
+LARGEST = 2 << 30
+"""Bytes; a generation that is found to hold more is followed by the next."""
+
+MEASURED_EVERY = 256
+"""Compilations of a generation after which it is measured: that takes half a second for 100000 files."""
+
+UNUSED = 3600.0
+"""Seconds after which a generation that is not the newest is removed; no compiler runs for half as long."""
+
+LARGEST_FILE = 64 << 20
+"""Bytes; no file that is kept to be read again is as large."""
+
+USED, FULL = "used", "full"
+"""Files in a generation: a byte for each compilation, as old as the last use; there once it is too large."""
+
+FULL_DISK = (
+    errno.ENOSPC,
+    errno.EFBIG,
+    *(getattr(errno, name) for name in ("EDQUOT",) if hasattr(errno, name)),
+)
+
+
+class UntrustedError(Exception):
+    """A cache that is left unused; the message says why."""
+
+
+def cache_folder() -> Path:
+    """Returns the generation of the cache that is in use.
+
+    SUPERVESSEL_CACHE names where the cache is; else it is in the user's cache folder, or where that cannot be
+    written a temporary one until the program ends. A cache that others can write is left unused, which is
+    said once on stderr, and a temporary one takes its place. Raises BuildError where the named folder cannot
+    be used.
+    """
+    named, base = base_folder()
+    try:
+        if base is not None:
+            _refuse_for_compilers(base)
+            return _generation(_opened(base))
+    except UntrustedError as why:
+        _say(f"the cache is left unused, nothing is kept: {why}")
+    except OSError as error:
+        if named:
+            raise BuildError(f"{_source()}: is no folder that can be written: {error.strerror}") from None
+    except ValueError as why:
+        if named:
+            raise BuildError(f"{_source()}: {why}") from None
+        _say(f"{printable(str(base or ''))}: cannot be the cache, nothing is kept: {why}")
+    return _temporary()
+
+
+def base_folder() -> tuple[bool, Path | None]:
+    """Returns whether the user has named the folder that the cache is in, and that folder, links followed.
+
+    There is none for a user without a home.
+    """
+    if named := os.environ.get("SUPERVESSEL_CACHE"):
+        return True, Path(os.path.realpath(named))
+    system = os.environ.get("XDG_CACHE_HOME" if os.name != "nt" else "LOCALAPPDATA", "")
+    try:
+        folder = Path(system) if Path(system).is_absolute() else Path.home() / ".cache"
+    except RuntimeError:  # a user without a home
+        return False, None
+    return False, Path(os.path.realpath(folder / "supervessel")) if folder.is_absolute() else None
+
+
+def _source() -> str:
+    return f"SUPERVESSEL_CACHE = {printable(str(os.environ['SUPERVESSEL_CACHE']))}"
+
+
+def _temporary() -> Path:
+    """Returns a cache for as long as the program runs."""
+    try:
+        folder = folder_of_program()
+        _refuse_for_compilers(folder)
+    except OSError as error:
+        raise BuildError(
+            f"{printable(str(tempfile.gettempdir()))}: {reason(error, 'to compile in')}"
+        ) from None
+    except ValueError as why:
+        raise BuildError(f"{printable(str(folder))}: {why}") from None
+    return folder
+
+
+def _refuse_for_compilers(folder: Path) -> None:
+    """Raises ValueError for a path that the compiler or its linker cannot work in."""
+    wrong = sorted({c for c in str(folder) if c == "%" or c in "\n\r\0"})
+    if wrong:
+        raise ValueError(f"the compiler works in no folder whose path holds {' or '.join(map(ascii, wrong))}")
+
+
+def _opened(base: Path) -> Path:
+    """Returns the folder of our own below a base, made if need be.
+
+    Raises UntrustedError where others can write it or what it is in, or where it is not of our making;
+    OSError where it cannot be made or written.
+    """
+    for folder in (*reversed(base.parents), base):
+        if not folder.exists():
+            with suppress(FileExistsError):
+                folder.mkdir(0o700)
+    if not base.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(base))
+    trust_around(base)
+    ours = base / OURS
+    if not os.path.lexists(ours):
+        _make(ours)
+    trust(ours)
+    if not os.access(ours, os.W_OK | os.X_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(ours))
+    return ours
+
+
+def _make(ours: Path) -> None:
+    """Makes our own folder, which appears with its tag."""
+    part = Path(tempfile.mkdtemp(dir=ours.parent, prefix=".supervessel-"))  # for the user alone
+    try:
+        (part / TAG).write_bytes(TAG_TEXT)
+        part.rename(ours)
+    except OSError:
+        shutil.rmtree(part, ignore_errors=True)
+        if not os.path.lexists(ours):  # else another run was faster
+            raise
+
+
+def trust(ours: Path) -> None:
+    """Raises UntrustedError unless a folder is a real one, of our making and the user's alone to write."""
+    status = ours.lstat()
+    if not stat.S_ISDIR(status.st_mode):
+        raise UntrustedError(f"{printable(str(ours))} is no folder, or a link to one")
+    if not is_own(status):
+        raise UntrustedError(f"{printable(str(ours))} belongs to another user")
+    if os.name == "posix" and status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        raise UntrustedError(f"others may write {printable(str(ours))} (chmod go-w lets it be used)")
+    if read_file(ours / TAG) != TAG_TEXT:
+        raise UntrustedError(
+            f"{printable(str(ours))} has not been made by supervessel, its {TAG} is another or missing"
+        )
+
+
+def trust_around(base: Path) -> None:
+    """Raises UntrustedError where others can put something else in the place of what is in a folder.
+
+    That is where they may write it, or one that it is in, unless that is sticky, as /tmp is; or where the
+    folder itself is another user's.
+    """
+    if os.name != "posix":
+        return
+    if base.stat().st_uid not in (0, os.geteuid()):
+        raise UntrustedError(f"{printable(str(base))} belongs to another user")
+    for folder in (base, *base.parents):
+        status = folder.stat()
+        others = status.st_mode & stat.S_IWOTH or (
+            status.st_mode & stat.S_IWGRP and not _is_own_group(status.st_gid)
+        )
+        if others and not status.st_mode & stat.S_ISVTX:
+            raise UntrustedError(f"others may write {printable(str(folder))}, and so replace what is in it")
+
+
+def _is_own_group(group: int) -> bool:
+    """Whether a group is the user's own, with nobody else in it, as many systems give everyone."""
+    if sys.platform == "win32":
+        return True
+    import grp  # noqa: PLC0415
+    import pwd  # noqa: PLC0415
+
+    try:
+        name = pwd.getpwuid(os.geteuid()).pw_name
+        found = grp.getgrgid(group)
+    except KeyError:
+        return False
+    return found.gr_name == name and set(found.gr_mem) <= {name}
+
+
+def _generation(ours: Path) -> Path:
+    """Returns the newest generation of a cache, made if need be; others that nobody uses are removed."""
+    numbers = generation_numbers(ours)
+    newest = max(numbers, default=0)
+    folder = ours / f"generation-{newest}"
+    if not is_own_folder(folder) or os.path.lexists(folder / FULL):
+        folder = ours / f"generation-{newest + 1}"
+        folder.mkdir(0o700, exist_ok=True)
+    _touch(folder / USED)
+    for number in numbers:
+        other = ours / f"generation-{number}"
+        if other != folder and _is_unused(other):
+            remove(other)
+    return folder
+
+
+def generation_numbers(ours: Path) -> list[int]:
+    """Returns the numbers of the generations that are there, whatever has such a name."""
+    found = (re.fullmatch(r"generation-(\d{1,9})", name) for name in os.listdir(ours))  # noqa: PTH208
+    return [int(match[1]) for match in found if match]
+
+
+def _touch(file: Path, more: bytes = b"") -> int:
+    """Has a file say that it has just been used, adds to it, and returns its size; 0 where that fails."""
+    flags = (
+        os.O_WRONLY | os.O_APPEND | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    )
+    try:
+        number = os.open(file, flags, 0o600)
+    except OSError:
+        return 0
+    try:
+        if not stat.S_ISREG(os.fstat(number).st_mode):
+            return 0
+        os.write(number, more)
+        os.utime(file)
+        return os.fstat(number).st_size
+    except OSError:
+        return 0
+    finally:
+        os.close(number)
+
+
+def _is_unused(generation: Path) -> bool:
+    """Whether a generation has not been used for so long that nobody can be using it."""
+    for file in (generation / USED, generation):
+        with suppress(OSError):
+            return abs(time.time() - file.lstat().st_mtime) > UNUSED
+    return False
+
+
+def count_compilation(generation: Path) -> None:
+    """Has a generation know that something was compiled; now and then it is measured, and full when large."""
+    count = _touch(generation / USED, b".")
+    if count and count % MEASURED_EVERY == 0 and size_of(generation) > LARGEST:
+        _touch(generation / FULL)
+
+
+def size_of(folder: Path) -> int:
+    """Returns the bytes that a folder's files take on the disk; links are not followed."""
+    total = 0
+    for place, _, names in os.walk(folder):
+        for name in names:
+            with suppress(OSError):
+                status = os.lstat(os.path.join(place, name))  # noqa: PTH118 (100000 times)
+                total += 512 * status.st_blocks if hasattr(status, "st_blocks") else status.st_size
+    return total
+
+
+def remove(path: Path) -> None:
+    """Removes what has a name, a real folder of the user's own whole; of a link only the link."""
+    if is_own_folder(path):
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        with suppress(OSError):
+            path.unlink()
+
+
+def kept_sources(files: Mapping[str, bytes]) -> Path:
+    """Returns a folder in the cache with exactly these files, by path, and nothing else.
+
+    The same files are in the same folder again: only then does the compiler know what it has built. What is
+    found there is compared byte by byte, and made anew where it differs.
+    """
+    digest = sha256()
+    for path, text in sorted(files.items()):
+        digest.update(f"{path} {len(text)} ".encode() + text)
+    kept = _folder_for("sources")
+    folder = kept / digest.hexdigest()
+    for _ in range(2):  # another run may put its own there in between
+        if _holds(folder, files):
+            return folder
+        remove(folder)
+        with tempfile.TemporaryDirectory(dir=kept) as name:
+            part = Path(name, "whole")
+            for path, text in files.items():
+                file = part / path
+                file.parent.mkdir(parents=True, exist_ok=True)
+                file.write_bytes(text)
+            try:
+                part.replace(folder)
+            except OSError:
+                if not os.path.lexists(folder):  # else another run was faster
+                    raise
+    if _holds(folder, files):
+        return folder
+    raise OSError(errno.EIO, "files change while they are used", str(folder))
+
+
+def _folder_for(kind: str) -> Path:
+    """Returns a folder in the generation in use, for things of a kind; what is in its place is removed."""
+    folder = cache_folder() / kind
+    if not folder.is_dir():
+        remove(folder)
+        folder.mkdir(0o700, exist_ok=True)
+    return folder
+
+
+def _holds(folder: Path, files: Mapping[str, bytes]) -> bool:
+    """Whether a folder holds these files, by path, as they are, and nothing else."""
+    if not is_own_folder(folder):
+        return False
+    folders = {str(parent) for path in files for parent in Path(path).parents} - {"."}
+    expected = folders | {str(Path(path)) for path in files}
+    found = set()
+    for name in _names(folder):
+        if name not in expected:
+            return False
+        found.add(name)
+    return found == expected and all(read_file(folder / path) == text for path, text in files.items())
+
+
+def _names(folder: Path) -> Iterator[str]:
+    """Yields the relative paths of all that is in a folder; what links lead to is not in it."""
+    for place, folders, names in os.walk(folder):
+        for name in (*folders, *names):
+            yield str(Path(place, name).relative_to(folder))
+
+
+def place_of_result(kind: str, question: bytes) -> Path:
+    """Returns the file in which the answer to a question is kept.
+
+    kind     : folder in the cache
+    question : all that the answer depends on
+    """
+    return _folder_for(kind) / f"{sha256(question).hexdigest()}.json"
+
+
+def read_file(file: Path) -> bytes | None:
+    """Returns the content of a regular file, None where there is anything else, or more than we keep.
+
+    It is never waited for, and a link is not followed.
+    """
+    flags = os.O_RDONLY
+    for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"):
+        flags |= getattr(os, name, 0)
+    try:
+        number = os.open(file, flags)
+    except OSError:
+        return None
+    try:
+        status = os.fstat(number)
+        if not stat.S_ISREG(status.st_mode) or status.st_size > LARGEST_FILE:
+            return None
+        with open(number, "rb", closefd=False) as stream:
+            return stream.read(LARGEST_FILE)
+    except OSError:
+        return None
+    finally:
+        os.close(number)
+
+
+def reason(error: OSError, purpose: str) -> str:
+    """Returns what went wrong: no room, or the system's own words and where."""
+    words = error.strerror or str(error)
+    return f"no room {purpose}: {words}" if error.errno in FULL_DISK else words
+
+
+@functools.cache
+def _say(message: str) -> None:
+    """Prints a line on stderr, once."""
+    if sys.stderr is not None:
+        with suppress(OSError, ValueError):
+            print(message, file=sys.stderr)

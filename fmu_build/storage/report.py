@@ -1,0 +1,91 @@
+"""What the command `supervessel cache` says of the cache, and how it clears it."""
+
+import re
+from datetime import datetime
+from pathlib import Path
+
+from fmu_build.errors import BuildError
+from fmu_build.storage.cache import (
+    LARGEST,
+    OURS,
+    UNUSED,
+    USED,
+    UntrustedError,
+    base_folder,
+    generation_numbers,
+    remove,
+    size_of,
+    trust,
+    trust_around,
+)
+from fmu_build.storage.temporary import is_own_folder
+from supervessel.problems import printable
+
+
+def report() -> str:
+    """Returns where the cache is, why it is left unused if it is, and what is in it; makes nothing."""
+    _, base = base_folder()
+    if base is None:
+        return "no cache is kept: the user has no home, and SUPERVESSEL_CACHE is not set"
+    ours = base / OURS
+    lines = [printable(str(ours))]
+    try:
+        if base.exists():
+            trust_around(base)
+            trust(ours)
+    except UntrustedError as why:
+        lines.append(f"left unused: {why}")
+    except FileNotFoundError:
+        pass
+    except OSError as error:
+        raise BuildError(f"{printable(str(error.filename))}: cannot be read: {error.strerror}") from None
+    numbers = sorted(generation_numbers(ours)) if is_own_folder(ours) else []
+    lines += [_line(ours / f"generation-{number}") for number in numbers]
+    if not numbers:
+        return "\n".join([*lines, "nothing is kept there"])
+    bound = f"when the newest passes {_size(LARGEST)} another begins"
+    gone = f"an older one goes {UNUSED / 3600.0:g} h after its last use"
+    return "\n".join([*lines, f"{bound}; {gone}"])
+
+
+def clear() -> str:
+    """Removes the cache, of whatever layout, and says what has gone and what has been left.
+
+    Raises BuildError where something could not be removed.
+    """
+    _, base = base_folder()
+    found = sorted(base.glob("supervessel-*")) if base is not None and base.is_dir() else []
+    lines = []
+    for folder in found:
+        if not re.fullmatch(r"supervessel-\d+", folder.name):
+            continue
+        try:
+            trust(folder)
+        except UntrustedError as why:
+            lines.append(f"left: {why}")
+            continue
+        size = size_of(folder)
+        remove(folder)
+        if folder.exists():
+            raise BuildError(f"{printable(str(folder))}: could not be removed whole")
+        lines.append(f"removed: {printable(str(folder))}, {_size(size)}")
+    return "\n".join(lines) or f"nothing to remove: {printable(str(base or 'no cache'))}"
+
+
+def _line(generation: Path) -> str:
+    """Returns a line about a generation."""
+    if not is_own_folder(generation):
+        return f"{generation.name}: no folder of the user's own, left alone"
+    used = generation / USED
+    last = (used if used.exists() else generation).lstat().st_mtime
+    when = datetime.fromtimestamp(last).astimezone().isoformat(" ", "minutes")
+    return f"{generation.name}: {_size(size_of(generation))}, last used {when}"
+
+
+def _size(count: float) -> str:
+    """Returns a number of bytes for reading."""
+    for unit in ("B", "KiB", "MiB"):
+        if count < 1024.0:
+            return f"{count:.4g} {unit}"
+        count /= 1024.0
+    return f"{count:.4g} GiB"

@@ -1,0 +1,309 @@
+"""The trade: references, errors apart, what is the same taken together, and the Pareto front."""
+
+import json
+import platform
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fmu_build.flight.choices import (
+    BEST,
+    Choice,
+    Model,
+    by_angle,
+    by_tolerance,
+    label,
+    models,
+    reference_choices,
+)
+from fmu_build.flight.experiment import SLACK, Course, TradeError, course_of, experiment_of
+from fmu_build.flight.flight import BUILT_WITH, Flown, Workshop, builds, fly_all, workshop
+from supervessel.scene.schema import Scene, without_accuracy
+
+Array = NDArray[np.float64]
+HALF_ULP = 2.0**-53
+Progress = Callable[[int, int, str], None]
+"""Told how many of how many parts are done, and the latest one."""
+
+
+ABOUT = {
+    "scene": "name of the scene",
+    "machine": "system and processor on which times were taken",
+    "versions": "of the packages that results depend on",
+    "experiment": "flown: duration [s], communication step [s], inputs as rows of time [s] and value",
+    "steps": "communication steps of the experiment",
+    "horizons": "times [s] up to which errors in lists are the largest; single errors are over the whole",
+    "doubt": "how far two ways to the best model's motion are apart: smaller errors are not told",
+    "models": "laws, and what each leaves out: its exact motion against the best model's, the last one",
+    "choices": "models with a propagator and its settings: errors and costs",
+    "refused": "choices that could not be flown",
+    "law": "[rotation] law",
+    "frozen": 'kind of inputs that keep their value at the start: "mass", "pose" or "", none',
+    "same": "models with the same motion to the last bit",
+    "attitude": "error [rad]: angle between the attitude and that of the law tensor with all inputs moving",
+    "rate": "error [rad/s]: length of the difference of the angular velocities, likewise",
+    "integration_attitude": "error [rad] against the exact motion of the same model",
+    "integration_rate": "error [rad/s] against the exact motion of the same model",
+    "propagator": "[rotation] propagator",
+    "setting": 'what its settings are: "max_angle_step" [rad], "tolerance" [1], "" where it has none',
+    "settings": "values of that; all of them move the same to the last bit",
+    "sub_steps": "sub-steps of the whole experiment",
+    "ns_per_step": "time [ns] of a communication step: inputs set, step, attitude and rate got",
+    "rk4_steps_per_step": "that over the time of a plain RK4 step, timed in turn",
+    "us_per_second": "time [us] that a second of motion takes",
+    "bytes": "size of the library",
+    "pareto": "whether no other choice is as good in both error of the attitude and cost, and better in one",
+    "choice": "model, propagator and setting",
+    "reason": "in the FMU's words",
+}
+"""What the keys of a trade are."""
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Largest errors up to each horizon, (3,): of the attitude [rad], of the angular velocity [rad/s]."""
+
+    attitude: Array
+    rate: Array
+
+
+@dataclass(frozen=True)
+class _Reference:
+    """A model's own motion: samples (n, 7), and how far two ways to it are apart."""
+
+    samples: Array
+    doubt: Errors
+
+
+def study(scene: Scene, *, quick: bool = False, progress: Progress = lambda *_: None) -> dict[str, Any]:
+    """Returns the trade of a scene, as trade.json lays it out: "about" says what each key is.
+
+    scene    : with an experiment
+    quick    : fewer laws, steps and tolerances
+    progress : told what has been done
+    Raises TradeError if the scene has no experiment or cannot run it, or if results cannot be kept,
+    BuildError if the compiler fails.
+    """
+    scene = without_accuracy(scene)  # a trade tries every law itself
+    course = course_of(scene)
+    tried = models(scene, quick=quick)
+    with workshop() as shop:
+        count = _Count(progress, shop)
+        references, refused = _references(scene, tried, course, count)
+        same = _same([model for model in tried if model in references], references)
+        kept = list(same)
+        flown = _ladders(scene, kept, count, quick=quick)
+    best = references[BEST]
+    rows = [
+        _row(choice, result, course, references[choice.model].samples, best.samples)
+        for choice, result in flown.items()
+        if result.refused is None
+    ]
+    rows = _merged(rows)
+    angles = [choice.angle for choice in by_angle(BEST, quick=quick)]
+    for row in rows:
+        if row["propagator"] == "rk4" and row["sub_steps"] == course.steps and angles[0] in row["settings"]:
+            row["settings"] = angles  # the finest divides no step: no other was flown
+    order = [str(model) for model in kept]
+    rows.sort(key=lambda row: (order.index(label(row)), row["propagator"], row["sub_steps"]))
+    _mark_front(rows, float(best.doubt.attitude[-1]))
+    return {
+        "about": ABOUT,
+        "scene": scene.name,
+        "machine": f"{platform.system()} {platform.machine()}",
+        "versions": {name: version(name) for name in ("supervessel", *BUILT_WITH)},
+        "experiment": experiment_of(scene).model_dump(mode="json"),
+        "steps": course.steps,
+        "horizons": course.horizons,
+        "doubt": _lists(best.doubt),
+        "models": [
+            {
+                "law": model.law,
+                "frozen": model.frozen,
+                "same": [str(other) for other in same[model]],
+                **_lists(errors(references[model].samples, best.samples, course)),
+            }
+            for model in kept
+        ],
+        "choices": [{key: value for key, value in row.items() if not key.startswith("_")} for row in rows],
+        "refused": [
+            {"choice": str(choice), "reason": result.refused}
+            for choice, result in [*refused.items(), *flown.items()]
+            if result.refused is not None
+        ],
+    }
+
+
+def is_trade(file: Path) -> bool:
+    """Whether a file is a trade, as trade.json holds it."""
+    try:
+        found = json.loads(file.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return False
+    return isinstance(found, dict) and {"about", "scene", "models", "choices"} <= found.keys()
+
+
+class _Count:
+    """How far the trade has come."""
+
+    def __init__(self, progress: Progress, shop: Workshop) -> None:
+        self.progress, self.shop, self.total, self.done = progress, shop, 0, 0
+
+    def fly(self, scene: Scene, choices: Sequence[Choice]) -> dict[Choice, Flown]:
+        """Returns what came of choices, and tells of each part of the work."""
+        begun = self.done
+        self.total = begun + len(choices) + builds(choices, self.shop)
+
+        def done(what: str) -> None:
+            self.done += 1
+            self.progress(self.done, self.total, what)
+
+        found = fly_all(scene, choices, self.shop, done)
+        self.done = self.total
+        return found
+
+
+def _references(
+    scene: Scene, tried: Sequence[Model], course: Course, count: _Count
+) -> tuple[dict[Model, _Reference], dict[Choice, Flown]]:
+    """Returns each model's own motion, and those without; the best model, flown first, must have one."""
+    pairs = {model: reference_choices(scene, model) for model in tried}
+    flown = count.fly(scene, pairs[BEST])
+    for result in flown.values():
+        if result.refused is not None:
+            raise TradeError(f"experiment: the scene cannot run it: {result.refused}")
+    flown |= count.fly(scene, [choice for model in tried if model != BEST for choice in pairs[model]])
+    references: dict[Model, _Reference] = {}
+    refused: dict[Choice, Flown] = {}
+    for model, pair in pairs.items():
+        one, other = (flown[choice] for choice in pair)
+        reason = one.refused or other.refused
+        if reason is not None:
+            refused[pair[0] if one.refused else pair[1]] = replace(one, refused=reason)
+        else:
+            references[model] = _Reference(
+                one.samples, _doubt(errors(other.samples, one.samples, course), one)
+            )
+    return references, refused
+
+
+def _doubt(apart: Errors, flown: Flown) -> Errors:
+    """Returns how well a reference is known: as two ways agree, not better than numbers are rounded."""
+    fastest = float(np.linalg.norm(flown.samples[:, 4:], axis=1).max())
+    return Errors(np.maximum(apart.attitude, HALF_ULP), np.maximum(apart.rate, HALF_ULP * fastest))
+
+
+def _same(tried: Sequence[Model], references: dict[Model, _Reference]) -> dict[Model, list[Model]]:
+    """Returns the models that move differently, each with those that move the same to the last bit.
+
+    Of those that do the cheapest, which stands first, is kept; the best model always is.
+    """
+    kept: dict[Model, list[Model]] = {}
+    for model in tried:
+        samples = references[model].samples
+        twin = next((k for k in kept if np.array_equal(references[k].samples, samples)), None)
+        if twin is None or model == BEST:
+            kept[model] = []
+        else:
+            kept[twin].append(model)
+    return kept
+
+
+def _ladders(scene: Scene, kept: Sequence[Model], count: _Count, *, quick: bool) -> dict[Choice, Flown]:
+    """Returns what came of the models' choices; coarser steps of rk4 where the finest divides any."""
+    steps = course_of(scene).steps
+    finest = [by_angle(model, quick=quick)[0] for model in kept]
+    others = [choice for model in kept for choice in by_tolerance(scene, model, quick=quick)]
+    flown = count.fly(scene, [*finest, *others])
+    coarser = [
+        choice
+        for first in finest
+        if flown[first].refused is not None or flown[first].sub_steps > steps
+        for choice in by_angle(first.model, quick=quick)[1:]
+    ]
+    flown |= count.fly(scene, coarser)
+    return flown
+
+
+def _row(choice: Choice, flown: Flown, course: Course, own: Array, best: Array) -> dict[str, Any]:
+    """Returns a choice with its errors over the whole flight and what it costs."""
+    total, integration = errors(flown.samples, best, course), errors(flown.samples, own, course)
+    return {
+        "law": choice.model.law,
+        "frozen": choice.model.frozen,
+        "propagator": choice.propagator,
+        "setting": next(iter(choice.settings), ""),
+        "settings": list(choice.settings.values()),
+        "attitude": float(total.attitude[-1]),
+        "rate": float(total.rate[-1]),
+        "integration_attitude": float(integration.attitude[-1]),
+        "integration_rate": float(integration.rate[-1]),
+        "sub_steps": flown.sub_steps,
+        "ns_per_step": flown.nanoseconds,
+        "rk4_steps_per_step": flown.ratio,
+        "us_per_second": 1e-3 * flown.nanoseconds * course.steps / course.duration,
+        "bytes": flown.size,
+        "pareto": False,
+        "_samples": flown.samples.tobytes(),
+    }
+
+
+def _merged(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Returns rows, one for all settings of a propagator that move the same in as many sub-steps."""
+    merged: dict[tuple[Any, ...], dict[str, Any]] = {}
+    for row in rows:
+        key = tuple(row[k] for k in ("law", "frozen", "propagator", "sub_steps", "_samples"))
+        if key in merged:
+            first = merged[key]
+            settings = [*first["settings"], *row["settings"]]
+            cheaper = row if row["rk4_steps_per_step"] < first["rk4_steps_per_step"] else first
+            merged[key] = first | {
+                "settings": settings,
+                **{k: cheaper[k] for k in ("ns_per_step", "rk4_steps_per_step", "us_per_second", "bytes")},
+            }
+        else:
+            merged[key] = row
+    return list(merged.values())
+
+
+def _mark_front(rows: Sequence[dict[str, Any]], doubt: float) -> None:
+    """Marks the rows that no other beats in error and cost; errors below the references' doubt are equal."""
+    for row in rows:
+        mine = max(row["attitude"], doubt), row["rk4_steps_per_step"]
+        row["pareto"] = not any(
+            (max(other["attitude"], doubt), other["rk4_steps_per_step"]) != mine
+            and max(other["attitude"], doubt) <= mine[0]
+            and other["rk4_steps_per_step"] <= mine[1]
+            for other in rows
+        )
+
+
+def errors(samples: Array, truth: Array, course: Course) -> Errors:
+    """Returns the largest errors of samples, (n, 7), up to each horizon."""
+    turned = attitude_apart(samples[:, :4], truth[:, :4])
+    off = np.linalg.norm(samples[:, 4:] - truth[:, 4:], axis=1)
+    ends = [
+        np.searchsorted(course.times, horizon + SLACK * course.size, "right") for horizon in course.horizons
+    ]
+    return Errors(*(np.array([x[: max(end, 1)].max() for end in ends]) for x in (turned, off)))
+
+
+def attitude_apart(one: Array, other: Array) -> Array:
+    """Returns the angles [rad], (n,), between attitudes, (n, 4) each; q and -q are the same.
+
+    From the vector part of the turn between them: an angle of 1e-16 shows.
+    """
+    w, v = one[:, 0], one[:, 1:]
+    a, b = other[:, 0], other[:, 1:]
+    vector = w[:, None] * b - a[:, None] * v - np.cross(v, b)
+    scalar = np.abs(w * a + np.sum(v * b, axis=1))
+    return np.asarray(2.0 * np.arctan2(np.linalg.norm(vector, axis=1), scalar))
+
+
+def _lists(found: Errors) -> dict[str, list[float]]:
+    return {"attitude": found.attitude.tolist(), "rate": found.rate.tolist()}

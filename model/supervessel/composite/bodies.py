@@ -1,0 +1,215 @@
+"""Docking in CasADi symbols: the vessels of a scene, placed in the root's axes and put together."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from supervessel.composite.constants import Places, constant_and_varying, lump, places
+from supervessel.composite.docks import Joint, Way, groups, ways
+from supervessel.composite.inertia import Body, combine, orbiter_moments, placed_body, symmetric
+from supervessel.composite.poses import Pose, constant, mated_pose, port_axes, scaled
+from supervessel.scene.schema import Scene
+
+Lookup = Callable[[str, ArrayLike], ca.SX]
+"""Takes an input's name without index and the scene's value; returns its symbols, or the constant."""
+
+
+@dataclass(frozen=True)
+class PlacedGroup:
+    """A rigid group of vessels and how it hangs on the root.
+
+    pose     : of the group's axes in the root vessel's
+    attached : 1 while docks hold it to the root, else 0; None: always
+    inside   : poses of its vessels in the group's axes, constants
+    """
+
+    pose: Pose
+    attached: ca.SX | None
+    inside: Places
+
+    def pose_of(self, vessel: str) -> Pose:
+        """Returns the pose of one of its vessels in the root vessel's axes."""
+        return self.pose.then(self.inside[vessel])
+
+
+def composite_body(scene: Scene, lookup: Lookup) -> Body:
+    """Returns what hangs on the root as one body in the root vessel's axes.
+
+    Vessels that no pose input and no dock input separates form a rigid group. Those of constant mass are
+    combined in the axes of the group's first vessel, so that they have become numbers before the group is
+    placed by the pose that moves it; the others are placed one by one.
+    """
+    bodies = []
+    for number, group in enumerate(placed_groups(scene, lookup)):
+        lumped = _lumped(scene, group.inside, lookup)
+        if number > 0:
+            pose = group.pose
+            lumped = [b.seen_from(pose.rotation, pose.origin, pose.velocity, pose.rate) for b in lumped]
+        if group.attached is not None:
+            lumped = [body.times(group.attached) for body in lumped]
+        bodies += lumped
+    return by_convention(scene, combine(bodies))
+
+
+def by_convention(scene: Scene, whole: Body) -> Body:
+    """Returns the whole as the scene's convention has it: Orbiter's is without products of inertia."""
+    if scene.convention == "orbiter":
+        diagonal = symmetric(lambda i, j: whole.inertia[i, i] if i == j else ca.SX(0.0))
+        return Body(whole.mass, whole.centre, diagonal, whole.velocity, whole.spin)
+    return whole
+
+
+def placed_groups(scene: Scene, lookup: Lookup) -> list[PlacedGroup]:
+    """Returns the rigid groups of a scene, the root's own first."""
+    parts = groups(scene)
+    inside = places(scene, parts)
+    pose_by = _placing(scene, lookup, inside)
+    placed = []
+    for number, alternatives in enumerate(ways(scene, parts)):
+        poses = [pose_by(way) for way in alternatives]
+        attached = [_all_true(way, lookup) for way in alternatives]
+        holding = [i for i, flag in enumerate(attached) if flag is None]
+        if len(alternatives) == 1 or holding:  # no other way can hold beside one that always does
+            always = holding[0] if holding else 0
+            placed.append(PlacedGroup(poses[always], attached[always], inside[number]))
+        else:
+            flags = [flag for flag in attached if flag is not None]
+            holds, pose = _chosen(flags, poses)
+            placed.append(PlacedGroup(pose, holds, inside[number]))
+    return placed
+
+
+def _placing(scene: Scene, lookup: Lookup, inside: Sequence[Places]) -> Callable[[Way], Pose]:
+    """Returns the function that gives a group's pose by one way.
+
+    inside : poses of the vessels of each group in its axes
+    """
+    home = {vessel: poses for poses in inside for vessel in poses}
+
+    @cache
+    def pose_by(way: Way) -> Pose:
+        if way.joint is None or way.before is None:
+            return inside[0][scene.root]
+        joint = way.joint
+        step = home[joint.parent][joint.parent].then(_joint_pose(scene, joint, lookup))
+        own = inside[way.group][joint.child]
+        is_reference = next(iter(inside[way.group])) == joint.child
+        return pose_by(way.before).then(step if is_reference else step.then(own.inverse()))
+
+    return pose_by
+
+
+def _all_true(way: Way, lookup: Lookup) -> ca.SX | None:
+    """Returns the product of the flags on a way; None if there is none on it."""
+    product = None
+    for dock in way.docks:
+        flag = lookup(f"{dock}.docked", 1.0)
+        product = flag if product is None else product * flag
+    return product
+
+
+def _chosen(flags: Sequence[ca.SX], poses: Sequence[Pose]) -> tuple[ca.SX, Pose]:
+    """Returns whether one of the ways holds, and the pose by it: all zero where none does.
+
+    flags : 1 for the way that holds, 0 for the others
+    """
+
+    def pick(values: Sequence[ca.SX]) -> ca.SX:
+        return sum(
+            (flag * value for flag, value in zip(flags[1:], values[1:], strict=True)), flags[0] * values[0]
+        )
+
+    rotation, origin = pick([p.rotation for p in poses]), pick([p.origin for p in poses])
+    attached = sum(flags[1:], flags[0])
+    if all(pose.rate is None for pose in poses):
+        return attached, Pose(rotation, origin)
+    still = ca.SX.zeros(3)
+    velocities = [still if pose.velocity is None else pose.velocity for pose in poses]
+    rates = [still if pose.rate is None else pose.rate for pose in poses]
+    return attached, Pose(rotation, origin, pick(velocities), pick(rates))
+
+
+def _lumped(scene: Scene, inside: Places, lookup: Lookup) -> list[Body]:
+    """Returns the vessels of a group in its axes: those that are constant as one body, before the others."""
+    constants, varying = constant_and_varying(scene, inside)
+    bodies = [vessel_body(scene, name, lookup, inside[name]) for name in varying]
+    if not constants:
+        return bodies
+    mass, centre, inertia = lump(scene, {name: inside[name] for name in constants})
+    return [Body(constant(mass), constant(centre), constant(inertia)), *bodies]
+
+
+def _joint_pose(scene: Scene, joint: Joint, lookup: Lookup) -> Pose:
+    """Returns the child's pose in the parent's axes, with its motion where a port moves.
+
+    Of ports at p_P, p_C that move with v, w each: the child's rate is w_P - R w_C, and with
+    o = p_P - R p_C its origin moves with v_P - rate x (R p_C) - R v_C.
+    """
+    parent, child = (_port(scene, name, lookup) for name in joint.ports)
+    pose = mated_pose(parent, child)
+    motions = [_port_motion(scene, name, lookup) for name in joint.ports]
+    if joint.dock is not None:
+        motions.append(_contact_motion(scene, joint, lookup, pose))
+    known = [motion for motion in motions if motion is not None]
+    if not known:
+        return pose
+    velocity, rate = ca.SX.zeros(3), ca.SX.zeros(3)
+    if motions[0] is not None:
+        velocity, rate = motions[0]
+    arm = pose.rotation @ child[0]
+    if motions[1] is not None:
+        rate = rate - pose.rotation @ motions[1][1]
+        velocity = velocity - pose.rotation @ motions[1][0]
+    if len(motions) > 2 and motions[2] is not None:
+        velocity, rate = velocity + motions[2][0], rate + motions[2][1]
+    return Pose(pose.rotation, pose.origin, velocity - ca.cross(rate, arm), rate)
+
+
+def _port_motion(scene: Scene, name: str, lookup: Lookup) -> tuple[ca.SX, ca.SX] | None:
+    """Returns velocity and rate of a port in its vessel's axes; None where it is at rest."""
+    if name not in scene.inputs.motion:
+        return None
+    velocity, rate = (lookup(f"{name}.{key}", np.zeros(3)) for key in ("velocity", "rate"))
+    if velocity.is_zero() and rate.is_zero():
+        return None
+    return velocity, rate
+
+
+def _contact_motion(scene: Scene, joint: Joint, lookup: Lookup, pose: Pose) -> tuple[ca.SX, ca.SX] | None:
+    """Returns velocity and rate, (3,) each, parent's axes, of the child at the port as it touches.
+
+    The inputs give those of the dock's second port relative to the first, in the axes of the first one's
+    vessel. Seen from a parent on the second port, the first one moves the other way.
+    """
+    velocity, rate = (lookup(f"{joint.dock}.{key}", np.zeros(3)) for key in ("velocity", "rate"))
+    if velocity.is_zero() and rate.is_zero():
+        return None
+    if joint.ports[0] == scene.dock(joint.dock or "").ports[0]:
+        return velocity, rate
+    return -(pose.rotation @ velocity), -(pose.rotation @ rate)
+
+
+def _port(scene: Scene, name: str, lookup: Lookup) -> tuple[ca.SX, ca.SX]:
+    """Returns position and axes of a port in its vessel's axes."""
+    port = scene.port(name)
+    position = lookup(f"{name}.position", port.position)
+    direction, alignment = (
+        lookup(f"{name}.{key}", scaled(getattr(port, key))) for key in ("direction", "alignment")
+    )
+    return position, port_axes(direction, alignment)
+
+
+def vessel_body(scene: Scene, name: str, lookup: Lookup, pose: Pose) -> Body:
+    """Returns a vessel as a body in the axes of its group."""
+    vessel = scene.vessels[name]
+    mass = lookup(f"{name}.mass", vessel.mass)
+    if vessel.pmi is not None:
+        pmi = lookup(f"{name}.pmi", vessel.pmi)
+        specific_inertia = ca.diag(orbiter_moments(pmi) if scene.convention == "orbiter" else pmi)
+    else:
+        specific_inertia = constant(vessel.specific_inertia)
+    return placed_body(mass, specific_inertia, constant(vessel.centre_of_mass), pose.rotation, pose.origin)

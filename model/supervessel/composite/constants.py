@@ -1,0 +1,127 @@
+"""What never changes in a scene, as numbers: where the vessels of rigid groups stand, and what they weigh.
+
+The equations are those of the other modules, each made a function once and evaluated for all vessels
+together: the same operations in the same order as on symbols that hold constants, so the same bits, in a
+small part of the time.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from supervessel.composite.docks import Group, Joint
+from supervessel.composite.inertia import combine_numbers, orbiter_moments, placed_body
+from supervessel.composite.poses import Pose, constant, mated_pose, port_axes, scaled
+from supervessel.scene.schema import Scene, Vessel
+
+Places = Mapping[str, Pose]
+"""Poses of vessels, constants, in the axes of their group."""
+
+
+def places(scene: Scene, parts: Sequence[Group]) -> list[Places]:
+    """Returns where the vessels of each rigid group stand."""
+    steps = iter(_mated_poses(scene, [joint for part in parts for joint in part.joints]))
+    found: list[Places] = []
+    for part in parts:
+        inside = {part.reference: Pose(constant(np.eye(3)), constant(np.zeros(3)))}
+        for joint in part.joints:
+            inside[joint.child] = inside[joint.parent].then(next(steps))
+        found.append(inside)
+    return found
+
+
+def constant_and_varying(scene: Scene, inside: Places) -> tuple[list[str], list[str]]:
+    """Returns the vessels of a group that are constant, and the others, in the order of adding them up.
+
+    The heaviest stand first, those whose mass is an input last; those without mass are left out.
+    """
+    of_mass, of_moments = set(scene.inputs.mass), set(scene.inputs.pmi)
+    known = [name for name in inside if name not in of_mass and scene.vessels[name].mass > 0.0]
+    known.sort(key=lambda name: -scene.vessels[name].mass)
+    varying = [name for name in known if name in of_moments] + [name for name in inside if name in of_mass]
+    return [name for name in known if name not in of_moments], varying
+
+
+def lump(scene: Scene, placed: Places) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+    """Returns vessels of constant mass as one body: mass [kg], centre (3,) [m], inertia (3, 3) [kg m2].
+
+    placed : the vessels, in the order in which they are added up; at least one
+    """
+    masses = np.array([scene.vessels[name].mass for name in placed])
+    centres, tensors = _seen(scene, placed, masses)
+    return combine_numbers(masses, centres, tensors)
+
+
+def seen_in_group(scene: Scene, placed: Places) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Returns centres, (n, 3) [m], and tensors over mass, (n, 3, 3) [m2], of vessels in the group's axes."""
+    centres, tensors = _seen(scene, placed, np.ones(len(placed)))
+    return centres.T, tensors.transpose(2, 0, 1)
+
+
+def _seen(
+    scene: Scene, placed: Places, masses: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Returns centres, (3, n) [m], and inertia tensors, (3, 3, n) [kg m2], in the group's axes."""
+    vessels = [scene.vessels[name] for name in placed]
+    centres, inertias = _placed_bodies()(
+        masses[None, :],
+        np.hstack([_specific_inertia(scene, vessel) for vessel in vessels]),
+        np.array([vessel.centre_of_mass for vessel in vessels]).T,
+        ca.evalf(ca.horzcat(*(pose.rotation for pose in placed.values()))),
+        ca.evalf(ca.horzcat(*(pose.origin for pose in placed.values()))),
+    )
+    return np.array(centres), np.array(inertias).reshape(3, len(vessels), 3).transpose(0, 2, 1)
+
+
+def _specific_inertia(scene: Scene, vessel: Vessel) -> NDArray[np.float64]:
+    """Returns a vessel's inertia tensor over mass, (3, 3) [m2], vessel axes, by the scene's convention."""
+    if scene.convention == "orbiter" and vessel.pmi is not None:
+        return np.diag(np.array(ca.evalf(orbiter_moments(constant(vessel.pmi))))[:, 0])
+    return np.array(vessel.specific_inertia)
+
+
+def _mated_poses(scene: Scene, joints: Sequence[Joint]) -> list[Pose]:
+    """Returns the pose of the child in the parent's axes of each joint, none of whose ports moves."""
+    if not joints:
+        return []
+    ports = [[scene.port(joint.ports[side]) for joint in joints] for side in (0, 1)]
+    numbers = [
+        np.array(vectors).T
+        for side in ports
+        for vectors in (
+            [port.position for port in side],
+            [scaled(port.direction) for port in side],
+            [scaled(port.alignment) for port in side],
+        )
+    ]
+    rotations, origins = _mated()(*numbers)
+    return [
+        Pose(rotation, origin)
+        for rotation, origin in zip(
+            ca.horzsplit(ca.SX(rotations), 3), ca.horzsplit(ca.SX(origins)), strict=True
+        )
+    ]
+
+
+@cache
+def _mated() -> ca.Function:
+    """Returns the function from position, direction, alignment of parent's and child's port to a pose."""
+    names = [
+        f"{side}_{key}" for side in ("parent", "child") for key in ("position", "direction", "alignment")
+    ]
+    vectors = [ca.SX.sym(name, 3) for name in names]
+    parent, child = ((vectors[i], port_axes(*vectors[i + 1 : i + 3])) for i in (0, 3))
+    pose = mated_pose(parent, child)
+    return ca.Function("mated", vectors, [pose.rotation, pose.origin])
+
+
+@cache
+def _placed_bodies() -> ca.Function:
+    """Returns the function from `placed_body`'s arguments to centre and inertia."""
+    sizes = {"mass": (1,), "specific_inertia": (3, 3), "centre": (3,), "rotation": (3, 3), "origin": (3,)}
+    arguments = {name: ca.SX.sym(name, *size) for name, size in sizes.items()}
+    body = placed_body(**arguments)
+    return ca.Function("placed", list(arguments.values()), [body.centre, body.inertia])

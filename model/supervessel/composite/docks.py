@@ -1,0 +1,164 @@
+"""The docks of a scene as a graph: rigid groups of vessels, and the ways by which they hang on the root."""
+
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from supervessel.scene.schema import Dock, Scene
+
+MOST_WAYS = 64
+"""Ways of docking by which a vessel may hang on the root: each has a pose of its own in the equations."""
+
+
+MOST_WAYS_IN_ALL = 2000
+MOST_PASSED = 50_000
+"""Ways of all vessels together, and docks with an input on them: a pose each, a factor each."""
+
+
+class TooManyWaysError(ValueError):
+    """A vessel may hang on the root in more than MOST_WAYS ways, or all of them in too many."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A mated pair of ports, seen from the root: the parent is placed before the child.
+
+    dock : name of the input that closes it; None: always closed
+    """
+
+    parent: str
+    parent_port: str
+    child: str
+    child_port: str
+    dock: str | None = None
+
+    @property
+    def ports(self) -> tuple[str, str]:
+        """Names of the two ports, "vessel.port", the parent's first."""
+        return f"{self.parent}.{self.parent_port}", f"{self.child}.{self.child_port}"
+
+
+@dataclass(frozen=True)
+class Group:
+    """Vessels that are held together by docks always closed, none of whose ports has a pose input.
+
+    reference : the vessel in whose axes the group is put together
+    joints    : the others, parents first
+    """
+
+    reference: str
+    joints: tuple[Joint, ...]
+
+    @property
+    def vessels(self) -> tuple[str, ...]:
+        return (self.reference, *(joint.child for joint in self.joints))
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """A way by which a group hangs on the root; it counts while every dock on it is closed.
+
+    group  : number of the group
+    joint  : the last on the way; None: the root's own group
+    before : the way of the group that this joint starts from
+    """
+
+    group: int
+    joint: Joint | None = None
+    before: "Way | None" = None
+
+    @property
+    def docks(self) -> tuple[str, ...]:
+        """Names of the inputs that must be true."""
+        names = [way.joint.dock for way in self._backwards() if way.joint and way.joint.dock]
+        return tuple(reversed(names))
+
+    def passes(self, group: int) -> bool:
+        return any(way.group == group for way in self._backwards())
+
+    def _backwards(self) -> "Iterator[Way]":
+        """Yields this way, then those before it."""
+        way: Way | None = self
+        while way is not None:
+            yield way
+            way = way.before
+
+
+def joints(scene: Scene) -> Iterator[Joint]:
+    """Yields the docks closed at the start so that every parent is the root or an earlier joint's child."""
+    return _spread(scene.root, _neighbours(scene, [dock for dock in scene.docks if dock.docked]))
+
+
+def groups(scene: Scene) -> tuple[Group, ...]:
+    """Returns the rigid groups, the root's own first, in the order in which they hang on it."""
+    moving = set(scene.inputs.pose)
+    rigid = [d for d in scene.docks if not switchable(scene, d) and not moving.intersection(d.ports)]
+    rigidly, somehow = _neighbours(scene, rigid), _neighbours(scene, scene.docks)
+    found: list[Group] = []
+    taken: set[str] = set()
+    for vessel in (scene.root, *(joint.child for joint in _spread(scene.root, somehow))):
+        if vessel not in taken:
+            found.append(Group(vessel, tuple(_spread(vessel, rigidly))))
+            taken.update(found[-1].vessels)
+    return tuple(found)
+
+
+def ways(scene: Scene, parts: Sequence[Group]) -> list[list[Way]]:
+    """Returns the ways by which each group may hang on the root.
+
+    Raises TooManyWaysError.
+    """
+    home = {vessel: number for number, part in enumerate(parts) for vessel in part.vessels}
+    neighbours = _neighbours(scene, scene.docks)
+    found: list[list[Way]] = [[] for _ in parts]
+    waiting = deque([Way(0)])
+    count = passed = 0
+    while waiting:
+        way = waiting.popleft()
+        found[way.group].append(way)
+        count, passed = count + 1, passed + len(way.docks)
+        if count > MOST_WAYS_IN_ALL or passed > MOST_PASSED:
+            raise TooManyWaysError(
+                f"docks: the vessels may hang on the root in more than {MOST_WAYS_IN_ALL} ways in all, or in "
+                f"ways over more than {MOST_PASSED} docks; at most that many are possible"
+            )
+        if len(found[way.group]) > MOST_WAYS:
+            raise TooManyWaysError(
+                f"docks: {parts[way.group].reference} may hang on the root in more than {MOST_WAYS} ways; "
+                "at most that many are possible"
+            )
+        for vessel in parts[way.group].vessels:
+            for joint in neighbours.get(vessel, []):
+                group = home[joint.child]
+                if not way.passes(group):
+                    waiting.append(Way(group, joint, way))
+    return found
+
+
+def switchable(scene: Scene, dock: Dock) -> bool:
+    """Whether an input opens and closes a dock."""
+    return dock.name is not None and dock.name in scene.inputs.docked
+
+
+def _neighbours(scene: Scene, docks: Sequence[Dock]) -> dict[str, list[Joint]]:
+    """Returns the docks of each vessel that has any, seen from it."""
+    neighbours: dict[str, list[Joint]] = {}
+    for dock in docks:
+        name = dock.name if switchable(scene, dock) else None
+        for here, there in (dock.ports, dock.ports[::-1]):
+            parent, parent_port = here.split(".")
+            child, child_port = there.split(".")
+            joint = Joint(parent, parent_port, child, child_port, name)
+            neighbours.setdefault(parent, []).append(joint)
+    return neighbours
+
+
+def _spread(start: str, neighbours: Mapping[str, Sequence[Joint]]) -> Iterator[Joint]:
+    """Yields joints from a vessel outwards, parents first, each vessel once."""
+    placed, waiting = {start}, deque([start])
+    while waiting:
+        for joint in neighbours.get(waiting.popleft(), ()):
+            if joint.child not in placed:
+                placed.add(joint.child)
+                waiting.append(joint.child)
+                yield joint

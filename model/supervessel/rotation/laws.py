@@ -1,0 +1,186 @@
+"""Rotation laws in CasADi symbols: angular acceleration from rates and torque, cheapest law first.
+
+A law is two functions. `prepare` turns an inertia tensor into the numbers that the law needs, once for
+each change of inertia; `acceleration` uses them at every stage of a step. A new law is one entry in LAWS.
+For series the same acceleration is also written as what the torque gives plus a linear map of products
+of two rates: `products` and `gyroscopic`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import sqrt
+from typing import TYPE_CHECKING
+
+import casadi as ca
+
+from supervessel.composite.inertia import from_upper_triangle, ldl, ldl_inverse, upper_triangle
+
+if TYPE_CHECKING:
+    from supervessel.scene.schema import Law
+
+GYROSCOPIC_GROWTH = 1.0 / (3.0 * sqrt(3.0))
+"""Largest growth rate of |omega| by the gyroscopic term, over |omega|^2.
+
+In principal axes d|omega|/dt = (a_1 + a_2 + a_3) w_1 w_2 w_3 / |omega| with a_i = (J_j - J_k)/J_i. For a
+rigid body |a_i| <= 1 and a_1 + a_2 + a_3 = -a_1 a_2 a_3, and |w_1 w_2 w_3| <= |omega|^3 / (3 sqrt 3).
+"""
+
+
+@dataclass(frozen=True)
+class RotationLaw:
+    """How the angular velocity changes.
+
+    prepare      : inertia (3, 3) [kg m2] -> the law's own numbers, (n,)
+    acceleration : those, angular velocity (3,) [rad/s], torque (3,) [N m] -> (3,) [rad/s2]; body axes
+    growth       : bound of d|omega|/dt over |omega|^2 without torque
+    products     : pairs (i, j), n of them: without torque the acceleration is linear in omega_i omega_j
+    gyroscopic   : the law's numbers -> that linear map, (3, n)
+    turning      : inertia (3, 3) -> the tensor, (3, 3), whose free motion the law describes
+    keeping      : inertia (3, 3) -> the tensor, (3, 3), by which a change keeps the angular momentum
+    """
+
+    prepare: Callable[[ca.SX], ca.SX]
+    acceleration: Callable[[ca.SX, ca.SX, ca.SX], ca.SX]
+    growth: float
+    products: tuple[tuple[int, int], ...]
+    gyroscopic: Callable[[ca.SX], ca.SX]
+    turning: Callable[[ca.SX], ca.SX]
+    keeping: Callable[[ca.SX], ca.SX]
+
+    @property
+    def gyroscopic_term(self) -> bool:
+        """Whether angular momentum turns the angular velocity."""
+        return bool(self.products)
+
+
+MIXED_PRODUCTS = ((1, 2), (2, 0), (0, 1))
+SQUARES = ((0, 0), (1, 1), (2, 2))
+
+
+def _nothing(inertia: ca.SX) -> ca.SX:
+    return ca.SX(0, 1)
+
+
+def _keep(numbers: ca.SX, omega: ca.SX, torque: ca.SX) -> ca.SX:
+    return ca.SX.zeros(3)
+
+
+def _spherical(inertia: ca.SX) -> ca.SX:
+    """Returns a tensor whose free motion is a steady rate."""
+    return ca.SX.eye(3)
+
+
+def _diagonal(inertia: ca.SX) -> ca.SX:
+    return ca.diag(ca.diag(inertia))
+
+
+def _whole(inertia: ca.SX) -> ca.SX:
+    return inertia
+
+
+def _no_products(numbers: ca.SX) -> ca.SX:
+    return ca.SX(3, 0)
+
+
+def _reciprocal_moments(inertia: ca.SX) -> ca.SX:
+    return 1.0 / ca.diag(inertia)
+
+
+def _decoupled(numbers: ca.SX, omega: ca.SX, torque: ca.SX) -> ca.SX:
+    return torque * numbers
+
+
+def _scale(inertia: ca.SX) -> ca.SX:
+    """Returns a power of two that brings the largest moment to between 3/4 and 3.
+
+    So scaled, moments times rates neither over- nor underflow before the rates do, and no other bit changes.
+    Two moments' mean is at least half of the third, and no larger than a double. Less 2^-52 of itself it is
+    one or two units in its last place smaller. Rounding powers of two from 1 on down, which changes nothing,
+    makes it a constant in derivatives.
+    """
+    mean = 0.5 * inertia[0, 0] + 0.5 * inertia[1, 1]
+    unit = mean - (1.0 - 2.0**-52) * mean
+    up, down = ca.floor(2.0**-52 / unit), ca.floor(2.0**52 * unit)
+    return ca.fmax(up, 1.0) / ca.fmax(down, 1.0)
+
+
+def _moments(inertia: ca.SX) -> ca.SX:
+    scale = _scale(inertia)
+    moments = scale * ca.diag(inertia)
+    return ca.vertcat(moments, 1.0 / moments, scale)
+
+
+def _principal(numbers: ca.SX, omega: ca.SX, torque: ca.SX) -> ca.SX:
+    """[CV] eq. (2): Euler's equations with the diagonal of the tensor only."""
+    J, reciprocal, torque = numbers[:3], numbers[3:6], numbers[6] * torque
+    return ca.vertcat(
+        (torque[0] - (J[2] - J[1]) * omega[1] * omega[2]) * reciprocal[0],
+        (torque[1] - (J[0] - J[2]) * omega[2] * omega[0]) * reciprocal[1],
+        (torque[2] - (J[1] - J[0]) * omega[0] * omega[1]) * reciprocal[2],
+    )
+
+
+def _principal_products(numbers: ca.SX) -> ca.SX:
+    """Returns the diagonal of (J_j - J_k)/J_i, (3, 3)."""
+    J, reciprocal = numbers[:3], numbers[3:6]
+    return ca.diag(ca.vertcat(J[1] - J[2], J[2] - J[0], J[0] - J[1]) * reciprocal)
+
+
+def _tensor_and_inverse(inertia: ca.SX) -> ca.SX:
+    scale = _scale(inertia)
+    scaled = scale * inertia
+    return ca.vertcat(upper_triangle(scaled), upper_triangle(ldl_inverse(*ldl(scaled))), scale)
+
+
+def _tensor(numbers: ca.SX, omega: ca.SX, torque: ca.SX) -> ca.SX:
+    """[CV] eq. (1): J omega' = M - omega x J omega with the full tensor.
+
+    Multiplying by the inverse takes as many operations as solving with the factors, but none of them
+    waits for another: half the time of a step.
+    """
+    J, inverse = from_upper_triangle(numbers[:6]), from_upper_triangle(numbers[6:12])
+    return inverse @ (numbers[12] * torque - ca.cross(omega, J @ omega))
+
+
+def _tensor_products(numbers: ca.SX) -> ca.SX:
+    """Returns J^-1 times -(omega x J omega) as a linear map of the products, (3, 6).
+
+    Written out, the moments occur as differences only: a nearly spherical body loses no digits.
+    """
+    J, inverse = from_upper_triangle(numbers[:6]), from_upper_triangle(numbers[6:12])
+    xy, xz, yz = J[0, 1], J[0, 2], J[1, 2]
+    rows = (
+        (J[1, 1] - J[2, 2], xy, -xz, 0.0, -yz, yz),
+        (-xy, J[2, 2] - J[0, 0], yz, xz, 0.0, -xz),
+        (xz, -yz, J[0, 0] - J[1, 1], -xy, xy, 0.0),
+    )
+    return inverse @ ca.vertcat(*(ca.horzcat(*row) for row in rows))
+
+
+def principal_products(moments: ca.SX) -> ca.SX:
+    """Returns (J_j - J_k)/J_i, (3,), which take MIXED_PRODUCTS to the acceleration without torque.
+
+    moments : principal, (3,) [kg m2]; rates and acceleration in their axes
+    The same as the map of the law "tensor" in body axes. There the inverse of the tensor enlarges rounding by
+    its condition number, with moments 1e12 apart to a steady spin about the lightest axis; here nothing is
+    inverted.
+    """
+    return ca.vertcat(*((moments[i - 2] - moments[i - 1]) / moments[i] for i in range(3)))
+
+
+LAWS: "dict[Law, RotationLaw]" = {
+    "none": RotationLaw(_nothing, _keep, 0.0, (), _no_products, _spherical, _whole),
+    "decoupled": RotationLaw(_reciprocal_moments, _decoupled, 0.0, (), _no_products, _spherical, _diagonal),
+    "principal": RotationLaw(
+        _moments, _principal, GYROSCOPIC_GROWTH, MIXED_PRODUCTS, _principal_products, _diagonal, _diagonal
+    ),
+    "tensor": RotationLaw(
+        _tensor_and_inverse,
+        _tensor,
+        GYROSCOPIC_GROWTH,
+        MIXED_PRODUCTS + SQUARES,
+        _tensor_products,
+        _whole,
+        _whole,
+    ),
+}

@@ -1,0 +1,69 @@
+"""How attitude and angular velocity are carried on in time: the table of methods, one file each.
+
+A method that takes steps builds them in CasADi symbols; the C layer and the twin drive what was built. A new
+one is its file and its line in PROPAGATORS.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from supervessel.rotation.propagators import dop853, exact, rk4, split, taylor
+from supervessel.rotation.propagators.method import Propagator
+
+if TYPE_CHECKING:
+    from supervessel.scene.schema import Scene
+
+PROPAGATORS: dict[str, Propagator] = {
+    "rk4": rk4.PROPAGATOR,
+    "dop853": dop853.PROPAGATOR,
+    "taylor": taylor.PROPAGATOR,
+    "exact": exact.PROPAGATOR,
+    "split": split.PROPAGATOR,
+}
+"""The methods; "auto" is a plan made of them."""
+
+
+CHANGING = ("mass", "pmi", "pose", "docked", "torque", "force", "vessel_torque")
+"""Inputs by which a motion may be other than free; Taylor steps know no spin of moving parts."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a scene's co-simulation uses.
+
+    method : whose steps it takes where free motion does not serve; None: it never does not
+    free   : "never", "always", "between kicks", or "while free": for each step without torque over which the
+             composite stays as it was
+    """
+
+    method: Propagator | None
+    free: str
+
+
+def plan_of(scene: "Scene") -> Plan:
+    """Returns what a scene asks for: its own method, or what "auto" stands for in it.
+
+    Raises ValueError for a scene whose law is still to be chosen.
+    """
+    if not scene.is_chosen:
+        raise ValueError(f'scene "{scene.name}" leaves its law to [accuracy]; supervessel.choose finds it')
+    name = scene.rotation.propagator
+    if name != "auto":
+        chosen = PROPAGATORS[name]
+        return Plan(chosen if chosen.build else None, chosen.free)
+    inputs = scene.inputs
+    if not any(getattr(inputs, key) for key in CHANGING):
+        return Plan(None, "always")
+    return Plan(PROPAGATORS["dop853" if inputs.motion else "taylor"], "while free")
+
+
+def description(scene: "Scene") -> str:
+    """Returns what a scene's propagator does, HTML."""
+    chosen = plan_of(scene)
+    if chosen.free != "while free":
+        return (chosen.method or PROPAGATORS["exact"]).text
+    assert chosen.method is not None
+    return (
+        "A step without torque, before which the composite has not changed, is exact free motion: "
+        f"{PROPAGATORS['exact'].text} Any other step: {chosen.method.text}"
+    )

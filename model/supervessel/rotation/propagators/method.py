@@ -1,0 +1,75 @@
+"""What a method of propagation is: the form that each file of this package fills."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import casadi as ca
+
+if TYPE_CHECKING:
+    from supervessel.rotation.laws import RotationLaw
+
+Control = Literal["angle", "error", "series"]
+Free = Literal["never", "always", "between kicks"]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What a step is built from, symbols or expressions of one scene.
+
+    state        : attitude and angular velocity, (7,)
+    rate         : state -> its rate, (7,)
+    law, numbers : the rotation law and its own numbers
+    torque       : (3,) [N m], body axes, constant over the step
+    step         : [s]
+    tolerance    : the scene's
+    with_error   : whether a method that needs no estimate for itself shall give one
+    """
+
+    state: ca.SX
+    rate: Callable[[ca.SX], ca.SX]
+    law: "RotationLaw"
+    numbers: ca.SX
+    torque: ca.SX
+    step: ca.SX
+    tolerance: float
+    with_error: bool
+
+    @property
+    def acceleration_by_torque(self) -> ca.SX:
+        """Angular acceleration by the torque alone, (3,) [rad/s2]."""
+        return self.law.acceleration(self.numbers, ca.SX.zeros(3), self.torque)
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of a method.
+
+    state    : (7,), after it, the attitude at unit length; of "split" after its first half kick
+    error    : estimate of its local error, (2,): attitude [rad], angular velocity [rad/s]; None: not wanted
+    exponent : power of the step that the estimate grows with
+    """
+
+    state: ca.SX
+    error: ca.SX | None
+    exponent: int
+
+
+@dataclass(frozen=True)
+class Propagator:
+    """A method.
+
+    build   : one step of it; None: it has no other step than free motion
+    control : what bounds a step: the angle that the body turns, or the estimated error; of a "series" too,
+              whose steps C takes by a loop of its own (fmu_build/c/taylor.c)
+    free    : when it uses exact free motion
+    text    : what it does, HTML
+    safety  : by how much the sum of estimates may exceed the tolerance: they are that much too large
+              (measured in tests/model/test_controlled.py)
+    """
+
+    build: Callable[[Motion], Step] | None
+    control: Control
+    free: Free
+    text: str
+    safety: float = 1.0

@@ -1,0 +1,35 @@
+"""Free motion between two halves of the torque's kick: for weak torque, however fast the body turns."""
+
+import casadi as ca
+
+from supervessel.rotation.propagators.method import Motion, Propagator, Step
+
+
+def build(motion: Motion) -> Step:
+    """Returns the state after the first half kick; free motion over the step and the same kick again follow.
+
+    The symmetric splitting of order 2. Its error is that of the trapezoidal rule for what the torque does,
+    carried on by the free motion to the end of the step. With a = |acceleration by torque| and
+    W = |omega| + a h: attitude a h^2 min(1, W h (2 + W h)/12),
+    angular velocity a h min(1, a h^2/4 + (W h)^2/3).
+    The gyroscopic term alone, of order (a h^2)^2, makes the a h^2/4; it is bounded by GYROSCOPIC_GROWTH < 1.
+    Source: G. Strang's splitting, [HLW] section II.5.
+    """
+    h, omega = motion.step, motion.state[4:]
+    by_torque = motion.acceleration_by_torque
+    kicked = ca.vertcat(motion.state[:4], omega + 0.5 * h * by_torque)
+    a = ca.norm_2(by_torque)
+    angle = h * (ca.norm_2(omega) + a * h)
+    attitude = a * h * h * ca.fmin(1.0, angle * (2.0 + angle) / 12.0)
+    rate = a * h * ca.fmin(1.0, 0.25 * a * h * h + angle * angle / 3.0)
+    return Step(kicked, ca.vertcat(attitude, rate), 3)
+
+
+PROPAGATOR = Propagator(
+    build,
+    "error",
+    "between kicks",
+    "Half of the torque's change of angular velocity, exact free motion over the step, the other half "
+    "([HLW] section II.5). The steps keep an a-priori bound of the error within the tolerance; they are not "
+    "limited by how fast the body turns, only by how strong the torque is.",
+)

@@ -1,0 +1,201 @@
+"""What the keys of a scene say of each other: moments, port directions, ranges, steps, the total mass.
+
+Works on the raw tables of a file and passes over what is no number, so that these problems are reported
+beside others.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from supervessel.problems import listed, printable, quantity, toml_key
+from supervessel.scene.numbers import Vector, is_number, triangle_problem, vector_length
+from supervessel.scene.schema import (
+    CHOSEN,
+    MOST_STEPS,
+    PARALLEL_LIMIT,
+    PERPENDICULAR_LIMIT,
+    VARIABLE_UNITS,
+    input_groups,
+    tables,
+)
+
+HALF_ULP = 2.0**-53
+
+
+def consistency_problems(raw: Mapping[str, Any]) -> list[str]:
+    """Returns what is wrong between the values of a scene, given as the raw tables of its file."""
+    problems: list[str] = []
+    rigid = raw.get("convention") != "orbiter"
+    for name, vessel in tables(raw, "vessels"):
+        place = f"vessels.{toml_key(name)}"
+        problems += _moments(place, vessel)
+        problems += _rigid_moments(place, vessel) if rigid else _no_tensor(place, vessel)
+        for port, table in tables(vessel, "ports"):
+            problems += direction_problems(f"{place}.ports.{toml_key(port)}", table)
+    problems += [*_experiment(raw), *_accuracy(raw), *_ranges(raw), *_total_mass(raw)]
+    return [*problems, *_propagator(raw), *_changes(raw)]
+
+
+def _moments(place: str, vessel: Mapping[str, Any]) -> Iterator[str]:
+    if "pmi" not in vessel and "inertia" not in vessel:
+        yield f"{place}.pmi: missing; a vessel needs pmi [m2] or inertia [kg m2]"
+    if "pmi" in vessel and "inertia" in vessel:
+        yield f"{place}.inertia: given beside pmi; a vessel takes one of the two"
+    elif "inertia" in vessel and _number(vessel, "mass") == 0.0:
+        yield f"{place}.mass = 0.0 kg: must be > 0 for a vessel given by inertia; inertia/mass is kept"
+
+
+def _rigid_moments(place: str, vessel: Mapping[str, Any]) -> Iterator[str]:
+    pmi = vessel.get("pmi")
+    if not (isinstance(pmi, list | tuple) and len(pmi) == 3 and all(map(is_number, pmi)) and min(pmi) >= 0):
+        return
+    x, y, z = map(float, pmi)
+    problem = triangle_problem((x, y, z))
+    if problem:
+        yield f"{place}.pmi = {quantity((x, y, z), 'm2')}: {problem}"
+
+
+def _no_tensor(place: str, vessel: Mapping[str, Any]) -> Iterator[str]:
+    if "inertia" in vessel:
+        yield f'{place}.inertia: convention = "orbiter" knows no products of inertia; give pmi [m2]'
+
+
+def direction_problems(place: str, port: Mapping[str, Any]) -> Iterator[str]:
+    """Yields why a port's alignment cannot be used with its direction."""
+    direction, alignment = _vector(port, "direction"), _vector(port, "alignment")
+    if direction is None or alignment is None:
+        return
+    sine, cosine = _sine_cosine(direction, alignment)
+    off = abs(math.atan2(cosine, sine))
+    against = f"must be perpendicular to direction = {quantity(direction)}"
+    where = f"{place}.alignment = {quantity(alignment)}: {against}"
+    if sine < PARALLEL_LIMIT:
+        yield f"{where}, but is parallel to it within {PARALLEL_LIMIT:g} rad"
+    elif off > PERPENDICULAR_LIMIT:
+        yield f"{where}, but is {off:.9g} rad off; at most {PERPENDICULAR_LIMIT:g} rad"
+
+
+def _vector(table: Mapping[str, Any], key: str) -> Vector | None:
+    """Returns three finite numbers that are not all zero, None where there is something else."""
+    value = table.get(key)
+    if isinstance(value, list | tuple) and len(value) == 3 and all(map(is_number, value)) and any(value):
+        x, y, z = map(float, value)
+        return x, y, z
+    return None
+
+
+def _sine_cosine(a: Vector, b: Vector) -> tuple[float, float]:
+    """Returns sine and cosine of the angle between two vectors of any length > 0."""
+    (a1, a2, a3), (b1, b2, b3) = (tuple(x / vector_length(v) for x in v) for v in (a, b))
+    cross = (a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1)
+    return math.hypot(*cross), a1 * b1 + a2 * b2 + a3 * b3
+
+
+def _experiment(raw: Mapping[str, Any]) -> Iterator[str]:
+    experiment = raw.get("experiment")
+    if isinstance(experiment, Mapping):
+        duration, step = _number(experiment, "duration"), _number(experiment, "step")
+        if step > duration > 0.0:
+            yield f"experiment.step = {step} s: must not exceed duration = {duration} s"
+
+
+def _accuracy(raw: Mapping[str, Any]) -> Iterator[str]:
+    """Yields why [accuracy] leaves nothing to choose, or asks for what cannot be."""
+    accuracy, rotation, inputs = (raw.get(key, {}) for key in ("accuracy", "rotation", "inputs"))
+    if "accuracy" not in raw or not isinstance(accuracy, Mapping):
+        return
+    horizon, step, rate = (_number(accuracy, key) for key in ("horizon", "step", "rate"))
+    if step > horizon > 0.0:
+        yield f"accuracy.step = {step} s: must not exceed horizon = {horizon} s"
+    elif step > 0.0 and horizon > MOST_STEPS * step:
+        count = f"accuracy.horizon = {horizon} s: in steps of {step} s that are {horizon / step:.6g} steps"
+        yield f"{count}; at most {MOST_STEPS}"
+    if isinstance(rotation, Mapping):
+        for key in CHOSEN:
+            if key in rotation:
+                yield f"rotation.{key}: given beside [accuracy], which chooses it; leave it out"
+        spin = _vector(rotation, "angular_velocity")
+        if spin is not None and 0.0 < rate < HALF_ULP * vector_length(spin):
+            least = f"{HALF_ULP * vector_length(spin):.3g} rad/s, what doubles tell of this angular_velocity"
+            yield f"accuracy.rate = {rate} rad/s: must be at least {least}"
+    without = list(_without_range(inputs)) if isinstance(inputs, Mapping) else []
+    if without:
+        names = listed((f'"{name}"' for name in without), len(without))
+        yield f"inputs.range: missing for {names}: [accuracy] needs one for every input that is a number"
+
+
+def _without_range(inputs: Mapping[str, Any]) -> Iterator[str]:
+    """Yields inputs, docks apart, that have no range; vectors of which no element has one by their name."""
+    ranges = inputs.get("range")
+    known = ranges if isinstance(ranges, Mapping) else {}
+    for group, size in input_groups(inputs).items():
+        if group in known or group.endswith(".docked"):
+            continue
+        elements = [f"{group}[{i}]" for i in range(1, size + 1)] or [group]
+        missing = [name for name in elements if name not in known]
+        yield from missing if len(missing) < len(elements) else [group]
+
+
+def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:
+    inputs = raw.get("inputs")
+    ranges = inputs.get("range") if isinstance(inputs, Mapping) else None
+    for name, bounds in ranges.items() if isinstance(ranges, Mapping) else ():
+        if not (isinstance(bounds, list | tuple) and len(bounds) == 2 and all(map(is_number, bounds))):
+            continue
+        low, high = map(float, bounds)
+        kind = name.rpartition(".")[2].partition("[")[0]
+        path = f'inputs.range."{printable(name)}" = {quantity((low, high), VARIABLE_UNITS.get(kind, ""))}'
+        if low > high:
+            yield f"{path}: low must not exceed high"
+        elif kind == "mass" and low < 0.0:
+            yield f"{path}: a mass must be >= 0 kg"
+        elif kind == "pmi" and low < 0.0:
+            yield f"{path}: a moment must be >= 0 m2"
+
+
+def _total_mass(raw: Mapping[str, Any]) -> Iterator[str]:
+    masses = [_number(vessel, "mass") for _, vessel in tables(raw, "vessels") if "inertia" not in vessel]
+    masses += [
+        _number(vessel, "mass") or math.nan for _, vessel in tables(raw, "vessels") if "inertia" in vessel
+    ]
+    if masses and all(mass >= 0.0 for mass in masses) and not 0.0 < sum(masses) < math.inf:
+        yield f"vessels: total mass = {sum(masses)} kg: must be a finite number > 0"
+
+
+def _number(table: Mapping[str, Any], key: str) -> float:
+    """Returns a finite number, NaN where there is something else."""
+    value = table.get(key)
+    return float(value) if is_number(value) else math.nan  # type: ignore[arg-type]
+
+
+def _propagator(raw: Mapping[str, Any]) -> Iterator[str]:
+    """Yields why a propagator makes no sense with what the scene has."""
+    rotation, inputs = (raw.get(key, {}) for key in ("rotation", "inputs"))
+    if not (isinstance(rotation, Mapping) and isinstance(inputs, Mapping)):
+        return
+    if rotation.get("propagator") != "split":
+        return
+    if rotation.get("law") == "none":
+        yield 'rotation.propagator = "split": must be "exact" for rotation.law = "none": torque does nothing'
+    elif not any(inputs.get(key) for key in ("torque", "force", "vessel_torque")):
+        yield 'rotation.propagator = "split": must be "exact" or "auto" without inputs.torque'
+
+
+def _changes(raw: Mapping[str, Any]) -> Iterator[str]:
+    """Yields why what a change shall keep makes no sense with what the scene has."""
+    rotation, inputs = (raw.get(key, {}) for key in ("rotation", "inputs"))
+    if not (isinstance(rotation, Mapping) and isinstance(inputs, Mapping)):
+        return
+    if rotation.get("law") == "none":
+        for key in ("mass_change", "pose_change"):
+            if rotation.get(key) == "momentum":
+                reason = 'must be "rate" for rotation.law = "none": the rate never changes'
+                yield f'rotation.{key} = "momentum": {reason}'
+        if inputs.get("motion"):
+            yield 'inputs.motion: makes no sense with rotation.law = "none": the rate never changes'
+    if rotation.get("pose_change") == "rate" and inputs.get("motion"):
+        yield 'rotation.pose_change = "rate": must be "momentum" where inputs.motion lists ports'
+    if rotation.get("propagator") in ("split", "taylor") and inputs.get("motion"):
+        allowed = '"auto", "rk4", "dop853" or "exact" where inputs.motion lists ports'
+        yield f'rotation.propagator = "{rotation["propagator"]}": must be {allowed}'

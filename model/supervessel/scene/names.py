@@ -1,0 +1,338 @@
+"""Names in a scene: that they exist, that they are written right, and that the docks make one tree.
+
+Works on the raw tables of a file, so that a wrong name is reported beside a wrong number.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from typing import Any
+
+from supervessel.problems import listed, printable, quantity, toml_key, unknown
+from supervessel.scene.schema import OUTPUT_NAMES, VESSEL_OUTPUT_NAMES, input_groups
+
+IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+MODEL_NAME = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*_?")
+LONGEST_NAME = 100
+"""Letters of a name: what file systems, linkers and archives take, with room for what stands around it."""
+DEVICE = re.compile(r"(con|prn|aux|nul|(com|lpt)[0-9])", re.IGNORECASE)
+"""Names that Windows keeps for devices, with any extension: no file can have one."""
+
+MOST_VESSELS = 2000
+MOST_MOVING = 1000
+MOST_LISTED = 2000
+"""Vessels, inputs that move or close docks, and names in another list of inputs that a scene may have: what
+is read in seconds."""
+
+Ports = Mapping[str, Collection[str]]
+"""Names of the ports, or points, of each vessel."""
+
+RESERVED = frozenset(
+    (
+        *OUTPUT_NAMES,
+        "time",
+        "state",
+        "der",
+        "torque",
+        "force",
+        "docked",
+        "velocity",
+        "rate",
+        "principal_moments",
+        "principal_axes",
+        "error_estimate",
+        "angular_velocity_start",
+        "attitude_start",
+    )
+)
+"""Names of the FMU's own variables, and those it will have: no vessel or port can take them."""
+
+
+def size_problems(raw: Mapping[str, Any]) -> Iterator[str]:
+    """Yields why a scene is too large to be looked at any further."""
+    inputs = _table(raw, "inputs")
+    lists = {f"inputs.{key}": len(_list(inputs, key)) for key in inputs}
+    moving = "inputs.pose and inputs.docked"
+    counts = {"vessels": len(_table(raw, "vessels")), **lists}
+    counts[moving] = lists.get("inputs.pose", 0) + lists.get("inputs.docked", 0)
+    for place, count in counts.items():
+        most = {"vessels": MOST_VESSELS, moving: MOST_MOVING}.get(place, MOST_LISTED)
+        if count > most:
+            yield f"{printable(place)}: {count} of them; at most {most} are possible"
+
+
+def naming_problems(raw: Mapping[str, Any]) -> list[str]:
+    """Returns what is wrong with the names of a scene, given as the raw tables of its file."""
+    ports = _parts(raw, "ports")
+    return [
+        *_model_name(raw),
+        *_identifiers(raw, ports),
+        *_docks(raw, ports),
+        *_inputs(raw, ports),
+        *_ranges(raw),
+        *misnamed_courses(raw).values(),
+        *_outputs(raw, ports),
+    ]
+
+
+def _table(raw: Any, key: str) -> Mapping[str, Any]:
+    """Returns a table, or an empty one where the file has something else there (reported elsewhere)."""
+    value = raw.get(key) if isinstance(raw, Mapping) else None
+    return value if isinstance(value, Mapping) else {}
+
+
+def _list(raw: Any, key: str) -> list[Any]:
+    value = raw.get(key) if isinstance(raw, Mapping) else None
+    return list(value) if isinstance(value, list | tuple) else []
+
+
+def _named(raw: Any, key: str) -> dict[str, None]:
+    """Returns the names in a list, each once, in their order."""
+    return dict.fromkeys(name for name in _list(raw, key) if isinstance(name, str))
+
+
+def _repeated(names: Iterable[str]) -> Iterator[str]:
+    """Yields which names stand in a list more than once."""
+    for name, count in sorted(Counter(names).items()):
+        if count > 1:
+            yield f"{printable(name)} is listed {count} times"
+
+
+def _parts(raw: Mapping[str, Any], key: str) -> Ports:
+    """Returns the names of the "ports" or "points" of each vessel."""
+    return {vessel: _table(table, key).keys() for vessel, table in _table(raw, "vessels").items()}
+
+
+def _dock_names(raw: Mapping[str, Any]) -> dict[int, str]:
+    """Returns the names of those docks that have one, by number from 1."""
+    docks = enumerate(_list(raw, "docks"), start=1)
+    names = {i: dock.get("name") for i, dock in docks if isinstance(dock, Mapping)}
+    return {i: name for i, name in names.items() if isinstance(name, str)}
+
+
+def _model_name(raw: Mapping[str, Any]) -> Iterator[str]:
+    name = raw.get("name")
+    if not isinstance(name, str):
+        return
+    if len(name) > LONGEST_NAME:
+        yield f"name = {quantity(name)}: {_too_long(name)}"
+    elif not MODEL_NAME.fullmatch(name):
+        yield f"name = {quantity(name)}: must be a letter, then letters, digits and single underscores"
+    elif DEVICE.fullmatch(name):
+        yield f"name = {quantity(name)}: must be another: files have it, and Windows keeps it for a device"
+
+
+def _too_long(name: str) -> str:
+    return f"has {len(name)} characters; a name has at most {LONGEST_NAME}"
+
+
+def _identifiers(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
+    if not ports and isinstance(raw.get("vessels"), Mapping):
+        yield "vessels: at least one vessel is needed"
+    points = _parts(raw, "points")
+    places = [("vessels", vessel) for vessel in ports]
+    for key, owners in (("ports", ports), ("points", points)):
+        places += [
+            (f"vessels.{toml_key(vessel)}.{key}", part) for vessel, names in owners.items() for part in names
+        ]
+    places += [(f"docks[{i}].name", name) for i, name in _dock_names(raw).items()]
+    for place, name in places:
+        if len(name) > LONGEST_NAME:
+            yield f"{place}: name {quantity(name)} {_too_long(name)}"
+        elif not IDENTIFIER.fullmatch(name):
+            rule = "must be a letter or underscore, then letters, digits, underscores"
+            yield f"{place}: name {quantity(name)} {rule}"
+        elif name in RESERVED:
+            yield f'{place}: name "{name}" is reserved for a variable of the FMU'
+    for vessel, names in points.items():
+        for name in sorted(set(names).intersection(ports[vessel])):
+            here = printable(vessel)
+            yield f'vessels.{here}.points: name "{printable(name)}" is that of a port of {here}'
+    first: dict[str, int] = {}
+    for i, name in _dock_names(raw).items():
+        if name in ports:
+            yield f'docks[{i}].name: name "{printable(name)}" is that of a vessel'
+        elif first.setdefault(name, i) != i:
+            yield f'docks[{i}].name: name "{printable(name)}" is that of docks[{first[name]}]'
+
+
+def _is_port(name: str, ports: Ports) -> bool:
+    vessel, _, port = name.partition(".")
+    return port in ports.get(vessel, ())
+
+
+def _port_problem(name: object, ports: Ports, kind: str = "port") -> str:
+    """Returns why `name` is no port (or point) of the scene, or "" if it is one."""
+    if not isinstance(name, str) or name.count(".") != 1:
+        return f'{quantity(name)} must be a {kind}, written "vessel.{kind}"'
+    vessel, port = name.split(".")
+    if vessel not in ports:
+        return unknown("vessel", vessel, ports)
+    if port not in ports[vessel]:
+        return unknown(f"{kind} of {vessel}", port, ports[vessel])
+    return ""
+
+
+def _docks(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
+    """Yields what keeps the docks closed at the start from making a forest, and all of them from reaching
+    every vessel from the root."""
+    switched = _named(_table(raw, "inputs"), "docked")
+    closed, reached = ({vessel: {vessel} for vessel in ports} for _ in range(2))
+    taken: dict[str, str] = {}
+    always: dict[str, str] = {}
+    complete = True
+    for number, dock in enumerate(_list(raw, "docks"), start=1):
+        place = f"docks[{number}].ports"
+        names = _list(dock, "ports")
+        if not all(isinstance(name, str) for name in names) or len(names) != 2:
+            complete = False
+            if names and all(isinstance(name, str) for name in names):
+                yield f'{place} = {quantity(dock["ports"])}: must be two ports, written "vessel.port"'
+            continue
+        switchable = isinstance(dock.get("name"), str) and dock["name"] in switched
+        open_at_start = dock.get("docked", True) is False
+        if open_at_start and not switchable:
+            yield f"docks[{number}].docked = false: must be true for a dock that inputs.docked does not list"
+        problems = [problem for name in names if (problem := _port_problem(name, ports))]
+        yield from (f"{place}: {problem}" for problem in problems)
+        occupied = always if open_at_start and switchable else taken
+        yield from (
+            f"{place}: port {printable(name)} is docked already, in {occupied[name]}"
+            for name in names
+            if name in occupied
+        )
+        vessels = [name.partition(".")[0] for name in names]
+        if not all(vessel in ports for vessel in vessels):
+            complete = False
+        elif vessels[0] == vessels[1]:
+            yield f"{place}: both ports belong to {printable(vessels[0])}; a dock joins two vessels"
+        else:
+            if not open_at_start and closed[vessels[0]] is closed[vessels[1]]:
+                loop, joined = " - ".join(map(printable, names)), " and ".join(map(printable, vessels))
+                yield f"{place}: {loop} closes a loop; {joined} are joined already"
+            for component in (reached,) if open_at_start else (closed, reached):
+                small, large = sorted((component[vessel] for vessel in vessels), key=len)
+                large |= small
+                component.update(dict.fromkeys(small, large))
+        if not open_at_start:
+            taken |= dict.fromkeys(names, f"docks[{number}]")
+        if not switchable:
+            always |= dict.fromkeys(names, f"docks[{number}]")
+    yield from _root(raw, reached if complete else {}, ports)
+
+
+def _root(raw: Mapping[str, Any], component: Mapping[str, set[str]], ports: Ports) -> Iterator[str]:
+    root = raw.get("root")
+    if not isinstance(root, str):
+        return
+    if root not in ports:
+        yield f"root: {unknown('vessel', root, ports)}"
+        return
+    for vessel, part in component.items():
+        if part is not component[root]:
+            yield f"vessels.{toml_key(vessel)}: is not reached from the root {printable(root)} by docks"
+
+
+def _inputs(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
+    inputs, points = _table(raw, "inputs"), _parts(raw, "points")
+    docked = {name for dock in _list(raw, "docks") for name in _named(dock, "ports")}
+    all_resolved = all(_is_port(name, ports) for name in docked)
+    posed = _named(inputs, "pose")
+    docks = dict.fromkeys(_dock_names(raw).values())
+
+    def pose_problem(key: str, name: str) -> str | None:
+        problem = _port_problem(name, ports)
+        if not problem and key == "motion" and name not in posed:
+            return f"{printable(name)} is not listed in inputs.pose; only a pose that is an input moves"
+        if not problem and name not in docked and all_resolved:
+            return f"{printable(name)} is not docked; its pose would change nothing"
+        return problem
+
+    def vessel_problem(key: str, name: str) -> str | None:
+        if name not in ports:
+            return unknown("vessel", name, ports)
+        if key == "pmi" and "inertia" in _table(_table(raw, "vessels"), name):
+            return f"{printable(name)} is given by inertia; only a vessel given by pmi has this input"
+        return None
+
+    def problem_of(key: str, name: str) -> str | None:
+        if key in ("pose", "motion"):
+            return pose_problem(key, name)
+        if key == "docked":
+            return None if name in docks else unknown("dock", name, docks)
+        if key == "force":
+            return _port_problem(name, points, "point")
+        return vessel_problem(key, name)
+
+    for key in ("mass", "pmi", "pose", "motion", "docked", "force", "vessel_torque"):
+        names = [name for name in _list(inputs, key) if isinstance(name, str)]
+        place = f"inputs.{key}"
+        yield from (f"{place}: {problem}" for problem in _repeated(names))
+        for name in dict.fromkeys(names):
+            problem = problem_of(key, name)
+            if problem:
+                yield f"{place}: {problem}"
+
+
+def _groups(raw: Mapping[str, Any]) -> dict[str, int]:
+    """Returns the inputs that the scene asks for: name without index -> elements (scalar: 0)."""
+    inputs = _table(raw, "inputs")
+    lists = {key: _list(inputs, key) for key in inputs if key != "torque"}
+    return input_groups(lists | {"torque": inputs.get("torque")})
+
+
+def misnamed_courses(raw: Mapping[str, Any]) -> dict[str, str]:
+    """Returns what is wrong with names in experiment.inputs, by name; what stands there is not looked at."""
+    groups = _groups(raw)
+    known = dict.fromkeys(one for name, size in groups.items() for one in _scalars(name, size))
+    problems = {}
+    for name, rows in _table(_table(raw, "experiment"), "inputs").items():
+        if groups.get(name):
+            quoted = ", ".join(f'"{one}"' for one in _scalars(name, groups[name]))
+            rule = "the elements of a vector are given one by one"
+            problems[name] = f'experiment.inputs."{printable(name)}": {rule}: {quoted}'
+        elif isinstance(rows, Mapping):
+            rule = "the name of an input stands in quotes here"
+            quoted = _quoted(name, rows)
+            problems[name] = f"experiment.inputs.{printable(name)}: {rule}: {quoted} = [[time, value]]"
+        elif name not in known:
+            problems[name] = f"experiment.inputs: {unknown('input', name, known)}"
+    return problems
+
+
+def _scalars(name: str, size: int) -> list[str]:
+    """Returns the elements of an input by their names; a size of 0 is that of a scalar."""
+    return [f"{name}[{i}]" for i in range(1, size + 1)] or [name]
+
+
+def _quoted(name: str, table: Mapping[str, Any]) -> str:
+    """Returns the keys of a table as the names that they were meant to be part of."""
+    return listed((f'"{name}.{key}"' for key in table), len(table))
+
+
+def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:
+    inputs = _table(raw, "inputs")
+    groups = {name: size for name, size in _groups(raw).items() if not name.endswith(".docked")}
+    known = dict.fromkeys(groups)
+    known |= dict.fromkeys(one for name, size in groups.items() for one in _scalars(name, size))
+    for name, bounds in _table(inputs, "range").items():
+        if isinstance(bounds, Mapping):
+            rule = "the name of an input stands in quotes here"
+            yield f"inputs.range.{printable(name)}: {rule}: {_quoted(name, bounds)} = [low, high]"
+        elif name not in known:
+            yield f"inputs.range: {unknown('input', name, known)}"
+
+
+def _outputs(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
+    names = [name for name in _list(_table(raw, "outputs"), "names") if isinstance(name, str)]
+    yield from (f"outputs.names: {problem}" for problem in _repeated(names))
+    for name in dict.fromkeys(names):
+        vessel, dot, output = name.partition(".")
+        if dot and vessel in ports and output in VESSEL_OUTPUT_NAMES:
+            continue
+        if dot and vessel in ports:
+            yield f"outputs.names: {unknown(f'output of {vessel}', output, VESSEL_OUTPUT_NAMES)}"
+        elif dot and output in VESSEL_OUTPUT_NAMES:
+            yield f"outputs.names: {unknown('vessel', vessel, ports)}"
+        elif name not in OUTPUT_NAMES:
+            yield f"outputs.names: {unknown('output', name, OUTPUT_NAMES)}"

@@ -1,0 +1,412 @@
+"""The scene: vessels with their masses and ports, how they are docked, what may change, how it turns.
+
+Every number is in SI units. The classes hold what a scene file says, checked one table at a time;
+`supervessel.loading` reads files and checks what the tables say of each other.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, get_args
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from supervessel.problems import quantity
+from supervessel.rotation.propagators import PROPAGATORS
+from supervessel.scene.numbers import (
+    Angle,
+    AngularVelocity,
+    Attitude,
+    AttitudeError,
+    Bounds,
+    Course,
+    Direction,
+    Mass,
+    Matrix,
+    Pmi,
+    Position,
+    RateError,
+    Seconds,
+    Tensor,
+    Tolerance,
+    Vector,
+)
+
+ORIGIN: Vector = (0.0, 0.0, 0.0)
+
+PARALLEL_LIMIT = 1e-6
+"""Angle [rad] between alignment and +-direction below which a port has no usable alignment."""
+PERPENDICULAR_LIMIT = 1e-3
+"""Departure [rad] of alignment from the plane across direction that a scene file may have."""
+
+MOST_STEPS = 1_000_000
+"""Communication steps that are flown: each input that moves takes eight bytes of each."""
+
+OUTPUT_NAMES = (
+    "mass",
+    "barycentre",
+    "pmi",
+    "inertia",
+    "angular_velocity",
+    "attitude",
+    "kinetic_energy",
+    "angular_momentum",
+    "principal_moments",
+    "principal_axes",
+    "error_estimate",
+    "net_force",
+)
+"""Outputs of the whole."""
+
+VESSEL_OUTPUT_NAMES = ("origin", "centre_of_mass", "attitude", "angular_velocity", "angular_momentum")
+"""Outputs of a vessel, written "vessel.output"."""
+
+VARIABLE_UNITS = {
+    "mass": "kg",
+    "pmi": "m2",
+    "position": "m",
+    "direction": "",
+    "alignment": "",
+    "velocity": "m/s",
+    "rate": "rad/s",
+    "docked": "",
+    "torque": "N.m",
+    "force": "N",
+    "barycentre": "m",
+    "inertia": "kg.m2",
+    "angular_velocity": "rad/s",
+    "attitude": "",
+    "kinetic_energy": "J",
+    "angular_momentum": "N.m.s",
+    "principal_moments": "kg.m2",
+    "principal_axes": "",
+    "error_estimate": "rad",
+    "net_force": "N",
+    "origin": "m",
+    "centre_of_mass": "m",
+}
+"""Units of inputs and outputs by the last part of their names, as FMI writes them; "" for a pure number."""
+
+
+class Table(BaseModel):
+    """A table of a scene file: unknown keys are refused, values never change once read."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True)
+
+
+def _text(value: object) -> object:
+    if isinstance(value, str):
+        return value
+    raise ValueError(f" = {quantity(value)}: must be a name in quotes")
+
+
+def _names(value: object) -> object:
+    if isinstance(value, list | tuple) and all(isinstance(name, str) for name in value):
+        return tuple(value)
+    raise ValueError(f" = {quantity(value)}: must be a list of names in quotes")
+
+
+def _flag(value: object) -> object:
+    if isinstance(value, bool):
+        return value
+    raise ValueError(f" = {quantity(value)}: must be true or false")
+
+
+def _one_of(*allowed: str) -> BeforeValidator:
+    def check(value: object) -> object:
+        if value in allowed:
+            return value
+        raise ValueError(f" = {quantity(value)}: must be one of {', '.join(allowed)}")
+
+    return BeforeValidator(check)
+
+
+Name = Annotated[str, BeforeValidator(_text)]
+Names = Annotated[tuple[str, ...], BeforeValidator(_names)]
+Flag = Annotated[bool, BeforeValidator(_flag)]
+Convention = Literal["rigid_body", "orbiter"]
+Law = Literal["none", "decoupled", "principal", "tensor"]
+Kept = Literal["rate", "momentum"]
+PROPAGATOR_NAMES = ("auto", *PROPAGATORS)
+
+
+class Port(Table):
+    """A docking port: position [m], outward approach direction and alignment direction, vessel axes."""
+
+    position: Position
+    direction: Direction
+    alignment: Direction
+
+
+class Point(Table):
+    """A point where a force acts: position [m], vessel axes."""
+
+    position: Position
+
+
+class Vessel(Table):
+    """A rigid part: mass [kg], moments about its centre of mass, centre of mass [m] in vessel axes, ports.
+
+    Either `pmi`, three mass-normalised moments [m2] along the vessel axes, or `inertia`, the full
+    tensor [kg m2] at the mass given, which scales with the mass when that is an input.
+    """
+
+    mass: Mass
+    pmi: Pmi | None = None
+    inertia: Tensor | None = None
+    centre_of_mass: Position = ORIGIN
+    ports: dict[str, Port] = Field(default_factory=dict)
+    points: dict[str, Point] = Field(default_factory=dict)
+
+    @property
+    def specific_inertia(self) -> Matrix:
+        """Inertia tensor over mass, (3, 3) [m2], about the centre of mass, vessel axes."""
+        if self.pmi is not None:
+            k1, k2, k3 = self.pmi
+            return ((k1, 0.0, 0.0), (0.0, k2, 0.0), (0.0, 0.0, k3))
+        assert self.inertia is not None
+        return tuple(tuple(x / self.mass for x in row) for row in self.inertia)  # type: ignore[return-value]
+
+
+class Dock(Table):
+    """Two docking ports, "vessel.port" each, that are mated: always, or while `docked` is true.
+
+    A dock listed in `inputs.docked` needs a `name`; `docked` is then its value at the start.
+    """
+
+    ports: Names
+    name: Name | None = None
+    docked: Flag = True
+
+
+class Inputs(Table):
+    """What may change while the scene runs; everything else is a constant.
+
+    mass, pmi     : vessels
+    pose          : docked ports
+    motion        : those of them whose velocity and rate are inputs too
+    docked        : docks, by name
+    torque        : about the barycentre
+    force         : points, "vessel.point"
+    vessel_torque : vessels
+    """
+
+    mass: Names = ()
+    pmi: Names = ()
+    pose: Names = ()
+    motion: Names = ()
+    docked: Names = ()
+    torque: Flag = False
+    force: Names = ()
+    vessel_torque: Names = ()
+    range: dict[str, Bounds] = Field(default_factory=dict)
+
+
+class Rotation(Table):
+    """The rotation law, how it is propagated, what changes keep, and the state at the start.
+
+    mass_change, pose_change : what a change of masses and moments, of poses keeps: the angular velocity or
+                               the angular momentum; see `Scene.keeps` for the default of pose_change
+    """
+
+    law: Annotated[Law, _one_of(*get_args(Law))] = "tensor"
+    propagator: Annotated[str, _one_of(*PROPAGATOR_NAMES)] = "auto"
+    tolerance: Tolerance = 1e-9
+    max_angle_step: Angle = 0.05
+    mass_change: Annotated[Kept, _one_of(*get_args(Kept))] = "rate"
+    pose_change: Annotated[Kept, _one_of(*get_args(Kept))] | None = None
+    angular_velocity: AngularVelocity = ORIGIN
+    attitude: Attitude = (1.0, 0.0, 0.0, 0.0)
+
+
+class Experiment(Table):
+    """The default experiment: duration [s], communication step [s]; what `supervessel trade` flies.
+
+    inputs : rows of time [s] and value by an input's name; linear between them, held before the first and
+             after the last, jumping where two have the same time; a dock's values are true and false. Others
+             keep the scene's values.
+    """
+
+    duration: Seconds
+    step: Seconds
+    inputs: dict[str, Course] = Field(default_factory=dict)
+
+
+class Accuracy(Table):
+    """How exact the motion shall be: law, propagator and its setting are then chosen.
+
+    attitude, rate : largest error [rad], [rad/s]; rate None: any
+    horizon        : from the start until when [s]
+    step           : communication step [s]
+    """
+
+    attitude: AttitudeError
+    rate: RateError | None = None
+    horizon: Seconds
+    step: Seconds
+
+
+class Outputs(Table):
+    """The outputs that the FMU has."""
+
+    names: Names = ("mass", "barycentre", "pmi", "angular_velocity", "attitude")
+
+
+class Scene(Table):
+    """A docked assembly. Made by `load_scene` or `parse_scene`, which check it as a whole.
+
+    Under the convention "orbiter" the composite is that of the Orbiter simulator, for comparison: moments
+    that no rigid body has are taken by the absolute values of [CV] eqs. (3-5), and of the composite's tensor
+    the diagonal alone is kept.
+
+    Example:
+        >>> scene.vessels["DG"].mass
+        24500.0
+    """
+
+    name: Name
+    root: Name
+    convention: Annotated[Convention, _one_of(*get_args(Convention))] = "rigid_body"
+    vessels: dict[str, Vessel]
+    docks: tuple[Dock, ...] = ()
+    inputs: Inputs = Inputs()
+    rotation: Rotation = Rotation()
+    accuracy: Accuracy | None = None
+    experiment: Experiment | None = None
+    outputs: Outputs = Outputs()
+
+    def port(self, name: str) -> Port:
+        """Returns the port called "vessel.port". Raises KeyError if there is none.
+
+        Example:
+            >>> scene.port("DG.nose").direction
+            (0.0, 0.0, -1.0)
+        """
+        vessel, port = name.split(".")
+        return self.vessels[vessel].ports[port]
+
+    def point(self, name: str) -> Point:
+        """Returns the point called "vessel.point". Raises KeyError if there is none.
+
+        Example:
+            >>> scene.point("DG.thruster")
+            Traceback (most recent call last):
+            KeyError: 'thruster'
+        """
+        vessel, point = name.split(".")
+        return self.vessels[vessel].points[point]
+
+    def dock(self, name: str) -> Dock:
+        """Returns the dock of that name. Raises KeyError if there is none.
+
+        Example:
+            >>> scene.dock("berth")
+            Traceback (most recent call last):
+            KeyError: 'berth'
+        """
+        for dock in self.docks:
+            if dock.name == name:
+                return dock
+        raise KeyError(name)
+
+    @property
+    def is_chosen(self) -> bool:
+        """Whether law and propagator are known: as given, or as `[accuracy]` has been answered.
+
+        Example:
+            >>> scene.is_chosen
+            True
+        """
+        return self.accuracy is None or "law" in self.rotation.model_fields_set
+
+    @property
+    def keeps(self) -> dict[str, Kept]:
+        """What a change keeps, for the kinds of change that inputs can make: "mass" (and moments), "pose".
+
+        A pose keeps momentum unless the scene says otherwise; the law "none" keeps the angular velocity
+        always.
+
+        Example:
+            >>> scene.keeps
+            {'mass': 'rate', 'pose': 'momentum'}
+        """
+        inputs, rotation = self.inputs, self.rotation
+        kinds: dict[str, Kept] = {}
+        if inputs.mass or inputs.pmi:
+            kinds["mass"] = rotation.mass_change
+        if inputs.pose:
+            kinds["pose"] = rotation.pose_change or ("rate" if rotation.law == "none" else "momentum")
+        return kinds
+
+
+def keeps_momentum(scene: Scene) -> bool:
+    """Whether every change that inputs can make keeps momentum: it is then the state of model exchange."""
+    return set(scene.keeps.values()) == {"momentum"}
+
+
+CHOSEN = ("law", "propagator", "tolerance", "max_angle_step")
+"""Keys of `[rotation]` that are chosen where a scene has `[accuracy]`."""
+
+
+def without_accuracy(scene: Scene) -> Scene:
+    """Returns the scene without `[accuracy]`: with the law that it has, or by default."""
+    return scene.model_copy(update={"accuracy": None})
+
+
+def changes_rate(scene: Scene) -> bool:
+    """Whether a change of inputs can change the angular velocity."""
+    changing = "momentum" in scene.keeps.values() or bool(scene.inputs.docked)
+    return changing and scene.rotation.law != "none"
+
+
+TABLES: dict[tuple[str, ...], type[Table]] = {
+    (): Scene,
+    ("vessels", "*"): Vessel,
+    ("vessels", "*", "ports", "*"): Port,
+    ("vessels", "*", "points", "*"): Point,
+    ("docks", "*"): Dock,
+    ("inputs",): Inputs,
+    ("rotation",): Rotation,
+    ("accuracy",): Accuracy,
+    ("experiment",): Experiment,
+    ("outputs",): Outputs,
+}
+"""Which table stands at which place of a scene file; "*" is a name or a number."""
+
+
+def known_keys(place: tuple[Any, ...]) -> list[str]:
+    """Returns the keys of the table at `place`, [] where no table is known."""
+    for pattern, table in TABLES.items():
+        if len(pattern) == len(place) and all(p in ("*", q) for p, q in zip(pattern, place, strict=True)):
+            return list(table.model_fields)
+    return []
+
+
+def tables(raw: Any, key: str) -> list[tuple[str, Mapping[str, Any]]]:
+    """Returns names and tables under a key of a raw table, without what is no table."""
+    value = raw.get(key) if isinstance(raw, Mapping) else None
+    found = value.items() if isinstance(value, Mapping) else ()
+    return [(name, table) for name, table in found if isinstance(table, Mapping)]
+
+
+def input_groups(inputs: Mapping[str, Any]) -> dict[str, int]:
+    """Returns the inputs that the lists of `[inputs]` ask for: name without index -> elements (scalar: 0).
+
+    inputs : the table by its keys; what is missing is empty
+    The order is that of the FMU's model description: what shapes the composite, the motion at contact, what
+    acts.
+    """
+
+    def names(key: str) -> list[str]:
+        return [name for name in inputs.get(key, ()) if isinstance(name, str)]
+
+    groups = {f"{name}.mass": 0 for name in names("mass")}
+    groups |= {f"{name}.pmi": 3 for name in names("pmi")}
+    moving = set(names("motion"))
+    for name in names("pose"):
+        parts = ("position", "direction", "alignment", *(("velocity", "rate") if name in moving else ()))
+        groups |= {f"{name}.{part}": 3 for part in parts}
+    groups |= {f"{name}.docked": 0 for name in names("docked")}
+    for name in names("docked"):
+        groups |= {f"{name}.velocity": 3, f"{name}.rate": 3}
+    groups |= {"torque": 3} if inputs.get("torque") is True else {}
+    groups |= {f"{name}.force": 3 for name in names("force")}
+    return groups | {f"{name}.torque": 3 for name in names("vessel_torque")}

@@ -1,0 +1,272 @@
+"""The FMU's own equations as CasADi functions, to the last bit: what the twin is built on."""
+
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+from typing import get_args
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fmu_build.accuracy import choose
+from supervessel.composite.inertia import from_upper_triangle
+from supervessel.equations import composite_slices, equations, p_start, simplification
+from supervessel.rotation.changes import followed
+from supervessel.rotation.propagators.exact import free_step
+from supervessel.scene.schema import PROPAGATOR_NAMES, Scene
+from supervessel.twin.error_state import ErrorForm
+from supervessel.twin.functions import TwinFunction
+from supervessel.twin.input_values import placed_values, settled
+
+GAP = 1e-8
+"""Least difference of principal moments, over the largest, for derivatives of free motion by p."""
+
+
+X_NAMES = (
+    *(f"state.attitude[{i}]" for i in range(1, 5)),
+    *(f"state.angular_velocity[{i}]" for i in range(1, 4)),
+)
+"""Names of the FMU's states, where the angular velocity is one; the twin's x always."""
+
+
+class Plant:
+    """Functions that give the FMU's numbers, symbols and names; `Twin` is where they are described."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        propagator: str | None = None,
+        doublings: int = 8,
+        error_form: ErrorForm = "rotvec",
+        fixed: bool | Iterable[str] | Mapping[str, ArrayLike] = False,
+    ) -> None:
+        if propagator not in (None, *PROPAGATOR_NAMES):
+            raise ValueError(f"propagator = {propagator!r}: must be one of {', '.join(PROPAGATOR_NAMES)}")
+        if error_form not in get_args(ErrorForm):
+            raise ValueError(f"error_form = {error_form!r}: must be one of {', '.join(get_args(ErrorForm))}")
+        if not (isinstance(doublings, int) and 0 <= doublings <= 64):
+            raise ValueError(f"doublings = {doublings!r}: must be a whole number from 0 to 64")
+        if not scene.is_chosen:
+            scene, _ = choose(scene)
+        if propagator is not None:
+            rotation = scene.rotation.model_copy(update={"propagator": propagator})
+            scene = scene.model_copy(update={"rotation": rotation})
+        self.scene, self.doublings, self.error_form = scene, doublings, error_form
+        self._model = equations(scene)
+        names = self._model.p_names + self._model.k_names
+        start = np.append(p_start(scene), np.zeros(len(self._model.k_names)))
+        constants = settled(fixed, names, start)
+        free = [i for i in range(len(names)) if i not in constants]
+        self.p_names = tuple(names[i] for i in free)
+        self.u_names, self.x_names = self._model.u_names, X_NAMES
+        self.y_names = tuple(name for name in self._model.y_names if name != "error_estimate")
+        self.p = ca.SX.sym("p", len(free))
+        self.u = ca.SX.sym("u", len(self.u_names))
+        self.x = ca.SX.sym("x", len(self.x_names))
+        self.h = ca.SX.sym("h")
+        self.p_start = start[free]
+        """The scene's values of p, (n,)."""
+        symbols = dict(zip(free, ca.vertsplit(self.p) if free else [], strict=True))
+        elements = (symbols[i] if i in symbols else ca.SX(constants[i]) for i in range(len(names)))
+        self._inputs = ca.vertcat(ca.SX(0, 1), *elements)
+        # CasADi turns x * (1/y) into x/y when the two meet in one graph. The FMU computes 1/y once for each
+        # change of inertia, so the twin must multiply by it as well to give the same last bit.
+        with simplification(False):
+            self._c = self._model.composite(self._inputs[: len(self._model.p_names)])
+            self._a = self._model.axes(self._c)
+
+    @cached_property
+    def x_start(self) -> NDArray[np.float64]:
+        """The scene's state at the start, (7,).
+
+        Example:
+            >>> twin.x_start.tolist()
+            [1.0, 0.0, 0.0, 0.0, 0.0, 0.0011, 0.0]
+        """
+        rotation = self.scene.rotation
+        return np.array([*rotation.attitude, *rotation.angular_velocity])
+
+    def p_with(self, values: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
+        """Returns the scene's p, (n,), with some values changed.
+
+        values : by the names of p, or three at once by a name without index
+        Raises ValueError for names that are none, sizes that do not fit, values that an
+        input can never have. What makes no sense together the FMU alone judges.
+
+        Example:
+            >>> twin.p_with({"DG.mass": 12000.0})[0]
+            np.float64(12000.0)
+        """
+        p = self.p_start.copy()
+        for i, value in placed_values(values, self.p_names).items():
+            p[i] = value
+        return p
+
+    @cached_property
+    def composite(self) -> TwinFunction:
+        """p -> mass [kg], barycentre (3,) [m], inertia (3, 3) [kg m2], pmi (3,) [m2].
+
+        Example:
+            >>> float(twin.composite(p=twin.p_start)["mass"])
+            479500.0
+        """
+        parts = {name: self._c[where] for name, where in composite_slices().items()}
+        with simplification(False):
+            results = {
+                "mass": parts["mass"],
+                "barycentre": parts["barycentre"],
+                "inertia": from_upper_triangle(parts["inertia"]),
+                "pmi": parts["pmi"],
+            }
+        return self._function("composite", {"p": self.p}, results)
+
+    @cached_property
+    def ode(self) -> TwinFunction:
+        """x, u, p -> x_dot, (7,); right for an attitude of any length.
+
+        Example:
+            >>> twin.ode(twin.x_start, [0, 0, 100], twin.p_start).shape
+            (7, 1)
+        """
+        with simplification(False):
+            rate = self._model.ode(self.x, self.u, self._c)
+        return self._function("ode", self._at, {"x_dot": rate}, unit=False)
+
+    @cached_property
+    def longest_step(self) -> TwinFunction:
+        """x, u, p -> h_max, the longest sub-step [s] that the FMU takes from x by "rk4".
+
+        Example:
+            >>> round(float(twin.longest_step(twin.x_start, [0, 0, 0], twin.p_start)), 2)
+            45.02
+        """
+        with simplification(False):
+            fastest = self._model.fastest_square(self.x, self.u, self._c)
+            longest = self.scene.rotation.max_angle_step / ca.sqrt(fastest)
+        return self._function("longest_step", self._at, {"h_max": longest}, unit=False)
+
+    @cached_property
+    def step(self) -> TwinFunction:
+        """x, u, p, h -> x_next, attitude at unit length, by one step of the scene's propagator.
+
+        Of "auto" by the method that it takes with torque. Where a problem's first attitude is of unit length,
+        |q| = 1 is no constraint to add: it would depend on the others.
+
+        Example:
+            >>> states = twin.step.mapaccum(50)(x=twin.x_start, u=[0, 0, 100], h=0.1)["x_next"]
+            >>> states.shape
+            (7, 50)
+        """
+        with simplification(False):
+            end = self._stepped(self._c, self._a)
+        return self._function("step", self._at | {"h": self.h}, {"x_next": end})
+
+    @cached_property
+    def outputs(self) -> TwinFunction:
+        """x, u, p -> y, the FMU's outputs but error_estimate, which follows from a step.
+
+        Example:
+            >>> y = twin.outputs(twin.x_start, [0, 0, 0], twin.p_start)
+            >>> y.numel() == len(twin.y_names)
+            True
+        """
+        with simplification(False):
+            y = self._model.outputs(self.x, self.u, self._c, self._a, 0.0)
+        shown = [i for i, name in enumerate(self._model.y_names) if name in self.y_names]
+        return self._function("outputs", self._at, {"y": y[shown]}, unit=False)
+
+    @cached_property
+    def change(self) -> TwinFunction:
+        """x, p, p_next -> x_next: what becomes of the state when the inputs p change, at one instant.
+
+        What undocks leaves with its share; masses, then poses change and keep rate or momentum as the scene
+        says; what docks brings its momentum along, moving as the inputs of motion at contact in p_next say.
+        NaN where what is joined has no moment of inertia when masses or poses change and keep the momentum,
+        which the FMU refuses.
+
+        Example:
+            >>> moved = twin.p_with({"DG.nose.position": [5.0, -0.49, -10.076]})
+            >>> x_next = twin.change(twin.x_start, twin.p_start, moved)
+            >>> bool(x_next[5] < twin.x_start[5])  # the ship is farther out: the same momentum, a lower rate
+            True
+        """
+        model, p_next = self._model, ca.SX.sym("p_next", self.p.numel())
+        shaping, omega = len(model.p_names), self.x[4:]
+        after = ca.substitute(self._inputs, self.p, p_next)
+        if model.change is not None:
+            inputs = (omega, self._inputs[:shaping], after[:shaping], after[shaping:])
+            with simplification(False):
+                margins = composite_slices()["margins"]
+                omega = followed(self.scene, model.change, model.composite, margins, inputs)
+        x_next = ca.vertcat(self.x[:4], omega)
+        return self._function("change", {"x": self.x, "p": self.p, "p_next": p_next}, {"x_next": x_next})
+
+    def rollout(self, count: int) -> TwinFunction:
+        """Returns the function x, u (m, N), p, h -> x_next (7, N) of N steps under one p.
+
+        The composite is computed once: a step costs less than one of `step.mapaccum`, whose p may change
+        at each. The numbers are the same.
+
+        Example:
+            >>> states = twin.rollout(50)(x=twin.x_start, u=[0, 0, 100], h=0.1)["x_next"]
+            >>> states.shape
+            (7, 50)
+        """
+        if not isinstance(count, int) or count < 1:
+            raise ValueError(f"rollout: {count!r} steps: must be a whole number from 1")
+        x, u = ca.MX.sym("x", 7), ca.MX.sym("u", self.u.numel(), count)
+        p, h = ca.MX.sym("p", self.p.numel()), ca.MX.sym("h")
+        c, a = (ca.SX.sym(name, part.numel()) for name, part in (("c", self._c), ("a", self._a)))
+        with simplification(False):
+            end = self._stepped(c, a)
+        numbers = ca.vertcat(c, a)
+        used = [i for i, needed in enumerate(ca.which_depends(end, numbers, 1, False)) if needed]
+        step = ca.Function("step_of_composite", [self.x, self.u, numbers[used], self.h], [end])
+        composite = ca.Function("numbers", [self.p], [ca.densify(ca.vertcat(self._c, self._a)[used])])
+        states = step.mapaccum(count)(x, u, ca.repmat(composite(p), 1, count), ca.repmat(h, 1, count))
+        return self._checked(ca.Function("rollout", [x, u, p, h], [states], ["x", "u", "p", "h"], ["x_next"]))
+
+    @property
+    def _at(self) -> dict[str, ca.SX]:
+        return {"x": self.x, "u": self.u, "p": self.p}
+
+    def _function(
+        self, name: str, arguments: Mapping[str, ca.SX], results: Mapping[str, ca.SX], unit: bool = True
+    ) -> TwinFunction:
+        function = ca.Function(name, [*arguments.values()], [*results.values()], [*arguments], [*results])
+        return self._checked(function, unit)
+
+    def _checked(self, function: ca.Function, unit: bool = True) -> TwinFunction:
+        defaults = {"u": np.zeros(len(self.u_names)), "acceleration_ref": np.zeros(3)}
+        defaults |= {"p": self.p_start, "p_next": self.p_start}
+        return TwinFunction(function, defaults, unit)
+
+    def _stepped(self, c: ca.SX, a: ca.SX) -> ca.SX:
+        """Returns the state after h by the scene's method, (7,), an expression of x, u, h, c and a."""
+        model = self._model
+
+        def free(x: ca.SX) -> ca.SX:
+            axes = a[model.axes_slices["free"]]
+            end = free_step(x, axes[:3], ca.reshape(axes[3:], 3, 3), self.h, self.doublings)
+            return end + _zero_without_derivative_at_equal(axes[:3])
+
+        def stepped(x: ca.SX) -> ca.SX:
+            return model.step.call([x, self.u, c, self.h])[0]
+
+        if model.plan.method is None:
+            pushed = ca.sumsqr(self.u) > 0.0 if self.u_names else ca.SX(0.0)
+            return free(self.x) + ca.if_else(pushed, ca.SX.nan(), 0.0)
+        if model.plan.free == "between kicks":
+            return stepped(free(stepped(self.x)))
+        return stepped(self.x)
+
+
+def _zero_without_derivative_at_equal(moments: ca.SX) -> ca.SX:
+    """Returns 0; its derivative is NaN where moments, (3,), ascending, are too close to tell axes by."""
+    if moments.is_constant():
+        return ca.SX(0.0)
+    least = ca.fmin(moments[1] - moments[0], moments[2] - moments[1])
+    beyond = least - GAP * moments[2]
+    # sqrt(0) has the derivative infinity; that of what it is taken from is 0 below the limit
+    return ca.if_else(beyond <= 0.0, ca.sqrt(ca.fmax(beyond, 0.0)), 0.0)

@@ -1,0 +1,387 @@
+"""The twin: the FMU's own equations as CasADi functions, for control design and estimation."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from fmu_build.compile.native import communication_step, generate
+from supervessel.composite.inertia import from_upper_triangle
+from supervessel.equations import composite_slices
+from supervessel.problems import unknown
+from supervessel.rotation.attitude import to_inertial, unit
+from supervessel.rotation.laws import LAWS
+from supervessel.rotation.principal import principal
+from supervessel.twin.conventions import acados_model, do_mpc_model
+from supervessel.twin.error_state import error_rate, retracted, state_error
+from supervessel.twin.functions import TwinFunction
+from supervessel.twin.linear import discrete_model, linear_model
+from supervessel.twin.plant import Plant
+
+FUNCTIONS = (
+    "composite",
+    "ode",
+    "step",
+    "longest_step",
+    "outputs",
+    "change",
+    "error",
+    "retract",
+    "error_ode",
+    "linearise",
+    "discretise",
+    "trim",
+    "principal",
+    "invariants",
+)
+"""Names of the twin's functions of fixed form."""
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Magnitudes that make a problem's numbers about 1: divide by them.
+
+    x : (7,), u : (m,) [N m], p : (n,), e : (6,), the error state; h : [s]
+    """
+
+    x: NDArray[np.float64]
+    u: NDArray[np.float64]
+    p: NDArray[np.float64]
+    e: NDArray[np.float64]
+    h: float
+
+
+class Twin(Plant):
+    """CasADi functions of a scene, from the very expressions that its FMU is generated from.
+
+    x = (attitude w, x, y, z; angular velocity [rad/s], body axes), (7,)
+    u = the inputs that act, torque [N m] first, then forces [N] and torques on vessels, (m,)
+    p = the FMU's other inputs, (n,), in the order of its model description
+    h = step [s]
+    e = (error of attitude [rad], of angular velocity [rad/s]) about a reference, body axes, (6,)
+
+    `composite`, `ode`, `step`, `longest_step`, `outputs`, `rollout` and `communication_step` give the FMU's
+    numbers; `error`, `retract`, `error_ode`, `linearise`, `discretise`, `trim`, `principal`, `invariants` are
+    for control design. All have named arguments, are made when first used, and check numbers that they are
+    called with (`TwinFunction`). p, u, x, h are symbols; p_names, u_names, x_names, y_names the FMU's names;
+    p_start and x_start the scene's values.
+
+    Each number of composite, ode, outputs but principal ones, and of a single sub-step of "rk4", "dop853" and
+    "taylor" is the FMU's to the last bit: both evaluate the same operations in the same order, and only
+    + - * / and the square root occur, which IEEE 754 rounds correctly everywhere. Taylor steps, free motion
+    and principal axes agree to a few u (1 + angle turned).
+
+    Directions in p may have any length whose square a double holds. Of p as a whole nothing is checked but
+    that it is finite: the FMU refuses a negative mass, parallel port axes, two ships at one port; the twin is
+    a formula that an optimiser may take there. `p_with` refuses what an input can never have.
+
+    scene      : from `load_scene`; with `[accuracy]`, as `choose` finds it
+    propagator : "rk4" and so on, instead of the scene's
+    doublings  : of free motion, "exact" and "split", in a step: room for a phase of FIRST_ANGLE 2^doublings,
+                 about the angle turned; where more is needed the step is NaN, as it is beyond 2e9 rad (which
+                 the FMU discards) and as is "exact" with a torque
+    error_form : "rotvec", "mrp" or "vec", of the attitude's error, see `error`
+    fixed      : inputs that shall be numbers, not elements of p: True for all; names, "DG.mass" or
+                 "DG.nose.position" for its three elements, for the scene's values; or a dictionary of values
+
+    Derivatives of a step are right wherever values are, with one exception: those of free motion by p need
+    principal axes. They are off by about 1e-15/gap, relatively, gap being the least difference of principal
+    moments over the largest; where it is below GAP = 1e-8 they are NaN. Steps of the other propagators need
+    no axes.
+
+    Example:
+        >>> from supervessel import Twin, load_scene
+        >>> twin = Twin(load_scene("examples/iss_dg.toml"))
+        >>> x_next = twin.step(twin.x_start, [0, 0, 100], twin.p_start, 0.1)
+        >>> lighter = Twin(twin.scene, fixed={"DG.mass": 12000.0})
+        >>> lighter.p_names[0], len(lighter.p_names)
+        ('DG.nose.position[1]', 9)
+    """
+
+    @cached_property
+    def error(self) -> TwinFunction:
+        """x, x_ref -> e, (6,): attitude's error and difference of the rates, about a reference.
+
+        The attitude's error, (3,) [rad], is that of q_ref* q in body axes, by `error_form`: "rotvec" the
+        rotation vector, "mrp" 4 times the modified Rodrigues parameters, "vec" 2 times the vector part; all
+        the same to first order. q and -q give the same error, so that no controller unwinds; value,
+        gradient and Hessian are finite everywhere. As a cost's residual it makes Gauss-Newton one line.
+
+        Example:
+            >>> twin.error([-0.8, 0, 0, -0.6, 0, 0, 0.5], [1, 0, 0, 0, 0, 0, 0])
+            DM([-0, -0, 1.287, 0, 0, 0.5])
+        """
+        x_ref = ca.SX.sym("x_ref", 7)
+        e = state_error(self.x, x_ref, self.error_form)
+        return self._function("error", {"x": self.x, "x_ref": x_ref}, {"e": e})
+
+    @cached_property
+    def retract(self) -> TwinFunction:
+        """x_ref, e -> x, (7,): the state that has the error e about x_ref, the inverse of `error`.
+
+        NaN for "vec" where the attitude's error is longer than 2.
+
+        Example:
+            >>> x = twin.retract(twin.x_start, [0.1, 0, 0, 0, 0, 1e-3])
+            >>> [round(v, 12) for v in twin.error(x, twin.x_start).full().ravel().tolist()]
+            [0.1, 0.0, 0.0, 0.0, 0.0, 0.001]
+        """
+        x_ref, e = ca.SX.sym("x_ref", 7), ca.SX.sym("e", 6)
+        x = retracted(x_ref, e, self.error_form)
+        return self._function("retract", {"x_ref": x_ref, "e": e}, {"x": x})
+
+    @cached_property
+    def error_ode(self) -> TwinFunction:
+        """e, u, p, x_ref, acceleration_ref -> e_dot, (6,), about a reference that moves on its own.
+
+        acceleration_ref : (3,) [rad/s2], how the reference's rate changes; left out it is zero
+
+        Example:
+            >>> twin.error_ode(e=[0.1, 0, 0, 0, 0, 0], x_ref=[1, 0, 0, 0, 0, 0, 0.5])["e_dot"][:3]
+            DM([0, -0.05, 0])
+        """
+        x_ref, e, a_ref = (ca.SX.sym(*s) for s in (("x_ref", 7), ("e", 6), ("acceleration_ref", 3)))
+        x = ca.vertcat(retracted(x_ref, e, self.error_form)[:4], x_ref[4:] + e[3:])
+        acceleration = self._model.ode(x, self.u, self._c)[4:]
+        e_dot = error_rate(e, x_ref[4:], acceleration, a_ref, self.error_form)
+        args = {"e": e, "u": self.u, "p": self.p, "x_ref": x_ref, "acceleration_ref": a_ref}
+        return self._function("error_ode", args, {"e_dot": e_dot})
+
+    @cached_property
+    def linearise(self) -> TwinFunction:
+        """x, u, p -> A (6, 6), B (6, m), E (6, n): e_dot = A e + B du + E dp about x, u, p.
+
+        Of the error state, so that a Riccati equation has a solution; the seven numbers of x have one
+        direction that nothing controls. The same for each form of the error.
+
+        Example:
+            >>> A, B, E = twin.linearise(twin.x_start, [0, 0, 0], twin.p_start)
+            >>> A.shape, B.shape, E.shape
+            ((6, 6), (6, 3), (6, 10))
+        """
+        acceleration = self._model.ode(self.x, self.u, self._c)[4:]
+        model = linear_model(self.x, self.u, self.p, acceleration)
+        return self._function("linearise", self._at, dict(zip("ABE", model, strict=True)))
+
+    @cached_property
+    def discretise(self) -> TwinFunction:
+        """x, u, p, h -> A (6, 6), B (6, m), E (6, n): e_next = A e + B du + E dp over one `step` from x.
+
+        The derivative of `step` itself, not the exponential of `linearise`: right about any trajectory, and
+        the error is that of the propagator. u and p are held over the step.
+
+        Example:
+            >>> A, B, E = twin.discretise(twin.x_start, [0, 0, 0], twin.p_start, 0.1)
+            >>> round(float(A[0, 3]), 6)
+            0.1
+        """
+        model = discrete_model(self.x, self.u, self.p, self._stepped(self._c, self._a))
+        return self._function("discretise", self._at | {"h": self.h}, dict(zip("ABE", model, strict=True)))
+
+    @cached_property
+    def trim(self) -> TwinFunction:
+        """x, p -> u, the torque that holds the rate of x steady: a relative equilibrium; no forces.
+
+        omega x J omega, zero for spins about `principal` axes; with J omega + h where ports move.
+
+        Example:
+            >>> u = twin.trim(twin.x_start, twin.p_start)
+            >>> float(ca.norm_inf(twin.ode(twin.x_start, u, twin.p_start)[4:])) < 1e-18
+            True
+        """
+        self.check_torque("trim")
+        omega = self.x[4:]
+        torque = ca.cross(omega, self._turning @ omega + self._spin)
+        u = ca.vertcat(torque, ca.SX.zeros(len(self.u_names) - 3))
+        return self._function("trim", {"x": self.x, "p": self.p}, {"u": u})
+
+    @cached_property
+    def principal(self) -> TwinFunction:
+        """p -> moments (3,) [kg m2], ascending, and axes (3, 3), R_body_principal, of what the law turns.
+
+        A spin about a column of axes needs no torque: about the first and last it is stable, about the
+        middle one it is not.
+
+        Example:
+            >>> moments, axes = twin.principal(twin.p_start)
+            >>> spin = ca.vertcat(1, 0, 0, 0, 0.01 * axes[:, 2])
+            >>> float(ca.norm_inf(twin.ode(spin, [0, 0, 0], twin.p_start)[4:])) < 1e-18
+            True
+        """
+        moments, axes = principal(self._turning)
+        return self._function("principal", {"p": self.p}, {"moments": moments, "axes": axes})
+
+    @cached_property
+    def invariants(self) -> TwinFunction:
+        """x, p -> kinetic_energy [J], angular_momentum (3,) [N m s], inertial axes: constant without torque.
+
+        Of the tensor that the law turns: J for "tensor", its diagonal for "principal"; "decoupled" and "none"
+        keep the rate itself, and a unit tensor stands for J.
+
+        Example:
+            >>> round(float(twin.invariants(twin.x_start, twin.p_start)[0]), 3)
+            198.191
+        """
+        omega = self.x[4:]
+        momentum = self._turning @ omega
+        results = {
+            "kinetic_energy": 0.5 * ca.dot(omega, momentum),
+            "angular_momentum": to_inertial(unit(self.x[:4]), momentum + self._spin),
+        }
+        return self._function("invariants", {"x": self.x, "p": self.p}, results)
+
+    def scales(self, time: float) -> Scales:
+        """Returns magnitudes for a manoeuvre that turns the body by about 1 rad in `time` [s].
+
+        Example:
+            >>> scales = twin.scales(60.0)
+            >>> scaled = ca.SX.sym("u", 3)  # about 1
+            >>> x_dot = twin.ode(x=twin.x, u=scales.u * scaled, p=twin.p)["x_dot"] / scales.x
+        """
+        if not (np.isfinite(time) and time > 0.0):
+            raise ValueError(f"scales: time = {time!r} s: must be positive")
+        rate = np.full(3, 1.0 / time)
+        moment = float(ca.trace(self.composite(self.p_start)[2])) / 3.0
+        torque = np.full(len(self.u_names), moment / time**2)
+        groups = [name.partition("[")[0] for name in self.p_names]
+        p = [
+            max(abs(v) for v, g in zip(self.p_start, groups, strict=True) if g == group) or 1.0
+            for group in groups
+        ]
+        return Scales(np.array([1.0] * 4 + [*rate]), torque, np.array(p), np.array([1.0] * 3 + [*rate]), time)
+
+    def check_torque(self, what: str) -> None:
+        """Raises ValueError where the scene has no torque input, which `what` needs.
+
+        Example:
+            >>> twin.check_torque("my controller")
+        """
+        if not self.scene.inputs.torque:
+            raise ValueError(
+                f'{what}: scene "{self.scene.name}" has no torque input; put "torque = true" under [inputs]'
+            )
+
+    @cached_property
+    def _spin(self) -> ca.SX:
+        """Angular momentum, (3,), of what moves relative to the body axes, as far as the law knows it."""
+        known = "momentum" in self._model.slices and LAWS[self.scene.rotation.law].gyroscopic_term
+        return self._c[self._model.slices["momentum"]][:3] if known else ca.SX.zeros(3)
+
+    @cached_property
+    def _turning(self) -> ca.SX:
+        """The tensor, (3, 3), whose free motion the law describes."""
+        inertia = from_upper_triangle(self._c[composite_slices()["inertia"]])
+        return LAWS[self.scene.rotation.law].turning(inertia)
+
+    def generate(
+        self,
+        folder: str | PathLike[str],
+        functions: Iterable[str | ca.Function] = ("composite", "ode", "step", "outputs"),
+        *,
+        derivatives: int = 1,
+    ) -> dict[str, ca.Function]:
+        """Returns functions by name, compiled to machine code and loaded back as `ca.external`.
+
+        folder      : where C and library go, made if need be; what is there already is not compiled again
+        functions   : names of this twin's, or functions themselves, `twin.rollout(20)` or any other of CasADi
+        derivatives : of what order derivatives are compiled too: 0, 1, or 2 for exact Hessians
+        The numbers are those of the originals to the last bit where only + - * / and the square root occur.
+        Raises ValueError for names that are none, BuildError if the compiler of package fmu_build fails.
+
+        Example:
+            >>> step = twin.generate("build/twin", ["step"], derivatives=0)["step"]
+            >>> at = twin.x_start, [0, 0, 100], twin.p_start, 0.1
+            >>> float(ca.norm_inf(step(*at) - twin.step(*at)))
+            0.0
+        """
+        if isinstance(functions, str | ca.Function):
+            functions = (functions,)
+        chosen = [self._named(f) if isinstance(f, str) else f for f in functions]
+        compiled = generate(chosen, Path(folder), f"{self.scene.name}_twin", derivatives)
+        return {
+            f.name(): f.like(c) if isinstance(f, TwinFunction) else c
+            for f, c in zip(chosen, compiled, strict=True)
+        }
+
+    def communication_step(self, folder: str | PathLike[str], sub_steps: int = 1) -> TwinFunction:
+        """Returns the function x, u, p, h -> x_next of a whole communication step, by the FMU's own C.
+
+        Sub-steps, control of the error and the choice that "auto" makes are the FMU's, to the last bit, as of
+        an FMU that is started at x under p. (Free motion over several steps is counted from where it began;
+        a later step then differs in the last bits.) What the FMU refuses raises RuntimeError, with the reason
+        on stderr: h <= 0, a torque for "exact", inputs that make no rigid body, too many sub-steps. It is
+        compiled already: `generate` takes nothing that calls it.
+
+        folder    : where the library goes, made if need be; what is there already is not compiled again
+        sub_steps : the derivatives, of any order, are those of so many equal steps of `step`: to rounding the
+                    value's own where the FMU takes these sub-steps, else as accurate as such steps are
+        Raises ValueError for a count below 1, BuildError if the compiler of package fmu_build fails.
+
+        Example:
+            >>> step = twin.communication_step("build/twin")
+            >>> states = step.mapaccum(5)(x=twin.x_start, u=[0, 0, 100], h=120.0)["x_next"]
+            >>> states.shape
+            (7, 5)
+        """
+        if not isinstance(sub_steps, int) or sub_steps < 1:
+            raise ValueError(f"communication_step: {sub_steps!r} sub-steps: must be a whole number from 1")
+        compiled = communication_step(self.scene, Path(folder))
+        sizes = {name: self.step.size1_in(name) for name in self.step.name_in()}
+        at = {name: ca.MX.sym(name, size) for name, size in sizes.items()}
+        columns = [ca.repmat(at[name], 1, sub_steps) for name in ("u", "p")]
+        end = self.step.fold(sub_steps)(at["x"], *columns, ca.repmat(at["h"] / sub_steps, 1, sub_steps))
+        blocks = [ca.jacobian(end, known) for known in at.values()]
+        jacobian = ca.Function(f"jac_{compiled.name()}", [*at.values(), ca.MX.sym("x_next", 7)], blocks)
+        inputs = ca.Function("inputs", [self.p], [self._inputs])(at["p"])
+        x_next = compiled(at["x"], at["u"], inputs, at["h"])
+        options: Any = {"custom_jacobian": jacobian, "enable_forward": False, "enable_reverse": False}
+        step = ca.Function(compiled.name(), [*at.values()], [x_next], [*at], ["x_next"], options)
+        return self._checked(step)
+
+    def to_acados(self, step: float | None = None) -> Any:
+        """Returns the plant as `acados_template.AcadosModel`: x, u, p, explicit and implicit ode.
+
+        step : [s], for discrete dynamics, disc_dyn_expr, by `step`
+        Raises ImportError without acados_template, ValueError for a scene without torque input.
+
+        Example:
+            >>> model = twin.to_acados(step=0.5)  # doctest: +SKIP
+        """
+        self.check_torque("to_acados")
+        return acados_model(self, step)
+
+    def to_do_mpc(self, step: float | None = None) -> Any:
+        """Returns the plant as `do_mpc.model.Model`, not yet set up: states attitude and angular_velocity.
+
+        Input torque (u where forces act too), parameter p. Add what your cost needs, then call its setup().
+        step : [s], for a discrete model by `step`; None: a continuous one
+        Raises ImportError without do_mpc, ValueError for a scene without torque input.
+
+        Example:
+            >>> model = twin.to_do_mpc(step=0.5)  # doctest: +SKIP
+        """
+        self.check_torque("to_do_mpc")
+        return do_mpc_model(self, step)
+
+    def to_dae(self) -> dict[str, ca.SX]:
+        """Returns the plant as `ca.integrator` takes it: x, u, p, ode.
+
+        Example:
+            >>> flow = ca.integrator("flow", "cvodes", twin.to_dae(), 0.0, 1.0)
+            >>> flow(x0=twin.x_start, u=[0, 0, 100], p=twin.p_start)["xf"].shape
+            (7, 1)
+        """
+        return {"x": self.x, "u": self.u, "p": self.p, "ode": self.ode(self.x, self.u, self.p)}
+
+    def _named(self, name: str) -> TwinFunction:
+        """Returns one of the functions by its name."""
+        if name not in FUNCTIONS:
+            raise ValueError(f"generate: {unknown('function', name, FUNCTIONS)}")
+        function: TwinFunction = getattr(self, name)
+        return function
