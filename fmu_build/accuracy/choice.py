@@ -4,10 +4,12 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from fmu_build.accuracy.flights import LONG, AccuracyError
+from fmu_build.accuracy.flights import LONG
 from fmu_build.accuracy.search import MARGIN, Progress, Search, Tried, begun
 from fmu_build.flight.choices import BEST, Choice, reference_choices
-from fmu_build.flight.flight import are_numbers, keep, place_of, read, workshop
+from fmu_build.flight.results import are_numbers, keep, place_of, read
+from fmu_build.flight.workshop import workshop
+from supervessel.problems import AccuracyError
 from supervessel.scene.schema import CHOSEN, Accuracy, Rotation, Scene
 
 CLAIM = (
@@ -45,26 +47,7 @@ COUNTS = ("steps", "looked_at", "rows_drawn", "rows_senseless")
 
 
 def choose(scene: Scene, progress: Progress = lambda _: None) -> tuple[Scene, dict[str, Any]]:
-    """Returns the scene with law, propagator and setting that `[accuracy]` asks for, and the evidence.
-
-    The cheapest candidate, by counted operations, whose flights through histories of inputs keep the
-    accuracy with a margin: a dictionary says what was asked, flown and found. What has been found is kept
-    in the user's cache, and the same again is read from there. `build_fmu` and `Twin` choose by themselves.
-
-    scene    : with `[accuracy]`
-    progress : told what is being done
-    Raises ValueError for a scene without it, AccuracyError where nothing meets it, BuildError if the
-    compiler fails.
-
-    Example:
-        >>> from supervessel import choose, parse_scene
-        >>> ball = {"name": "ball", "root": "B", "vessels": {"B": {"mass": 1.0, "pmi": [1.0, 2.0, 2.0]}}}
-        >>> asked = {"accuracy": {"attitude": 1e-6, "horizon": 10.0, "step": 0.1}}
-        >>> spin = {"rotation": {"angular_velocity": [0.1, 0.0, 0.0]}}
-        >>> chosen, evidence = choose(parse_scene(ball | asked | spin))
-        >>> chosen.rotation.law, chosen.rotation.propagator
-        ('none', 'rk4')
-    """
+    """Returns what `supervessel.choose` does."""
     accuracy = scene.accuracy
     if accuracy is None:
         raise ValueError(f'scene "{scene.name}" has no [accuracy]: nothing is to be chosen')

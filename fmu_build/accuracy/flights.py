@@ -7,31 +7,19 @@ from numpy.typing import NDArray
 
 from fmu_build.accuracy.histories import Body, Histories
 from fmu_build.flight.choices import Choice
-from fmu_build.flight.experiment import TradeError
-from fmu_build.flight.flight import (
-    AT_ONCE,
-    OUT_OF_TIME,
-    Inputs,
-    Workshop,
-    build_all,
-    job_of,
-    run_host,
-    source_of,
-)
+from fmu_build.flight.flying import OUT_OF_TIME, InputCourses, job_of, run_host
+from fmu_build.flight.workshop import AT_ONCE, Workshop, build_all, source_of
 from fmu_build.trade.study import attitude_apart
+from supervessel.composite.resolved import resolve
 from supervessel.equations import Equations
+from supervessel.problems import AccuracyError
 from supervessel.scene.schema import Scene
-from supervessel.scene.variables import input_variables
 from supervessel.shell.processes import Workers
 
 Array = NDArray[np.float64]
 
 LONG = 20_000
 """Steps beyond which libraries are optimised, and a process flies one history alone."""
-
-
-class AccuracyError(TradeError):
-    """An accuracy that cannot be had; the message says what can."""
 
 
 def followed(scene: Scene, shop: Workshop, every: Histories, choice: Choice) -> tuple[Array, list[int]]:
@@ -58,7 +46,7 @@ def body_of(scene: Scene, model: Equations) -> Body:
     return body
 
 
-def judged(scene: Scene, shop: Workshop, choice: Choice, inputs: Inputs) -> NDArray[np.bool_]:
+def judged(scene: Scene, shop: Workshop, choice: Choice, inputs: InputCourses) -> NDArray[np.bool_]:
     """Returns for rows of inputs whether the FMU of a choice starts with them."""
     job = {"tolerance": 0.0, "size": 1.0, "last_size": 1.0, "steps": 1, "sampled": [], "seconds": 0.0}
     ended = run_host(
@@ -108,7 +96,7 @@ def _ended(choice: Choice, ended: tuple[list[dict[str, Any]], bytes] | str | Non
 
 def names_of(scene: Scene) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Returns the names of inputs that are numbers, and of those of docks, in the order of columns."""
-    variables = input_variables(scene)
+    variables = resolve(scene).inputs
     return tuple(v.name for v in variables if not v.boolean), tuple(v.name for v in variables if v.boolean)
 
 

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fmu_build.flight.experiment import Course, course_of
-from fmu_build.flight.flight import Inputs
+from fmu_build.flight.flying import InputCourses
+from supervessel.composite.resolved import resolve
 from supervessel.scene.schema import Accuracy, Experiment, Scene
-from supervessel.scene.variables import input_variables
 
 Array = NDArray[np.float64]
-Judge = Callable[[Inputs], NDArray[np.bool_]]
+Judge = Callable[[InputCourses], NDArray[np.bool_]]
 """Returns of rows of inputs whether an FMU starts with them."""
 
 Body = Callable[[Array, Array], tuple[Array, Array]]
@@ -68,7 +68,7 @@ class History:
     """What inputs do, and how that is called."""
 
     name: str
-    inputs: Inputs
+    inputs: InputCourses
 
 
 @dataclass(frozen=True)
@@ -108,14 +108,14 @@ class _Columns:
     high: Array
     start: Array
 
-    def inputs(self, rows: NDArray[np.int64], values: Array) -> Inputs:
+    def inputs(self, rows: NDArray[np.int64], values: Array) -> InputCourses:
         """Returns values, (rows, n), as inputs set before steps."""
         split = len(self.numbers)
-        return Inputs(rows, values[:, :split], values[:, split:])
+        return InputCourses(rows, values[:, :split], values[:, split:])
 
 
 def _columns(scene: Scene) -> _Columns:
-    variables = sorted(input_variables(scene), key=lambda variable: variable.boolean)  # numbers come first
+    variables = sorted(resolve(scene).inputs, key=lambda variable: variable.boolean)  # numbers come first
     bounds = [(0.0, 1.0) if v.boolean else (v.low, v.high) for v in variables]
     low, high = np.array(bounds, dtype=float).reshape(-1, 2).T
     return _Columns(

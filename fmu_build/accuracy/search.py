@@ -9,14 +9,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fmu_build.accuracy.cost import Costs, costs, free_operations, per_step
-from fmu_build.accuracy.flights import AccuracyError, apart, body_of, fly, followed, judged
+from fmu_build.accuracy.flights import apart, body_of, fly, followed, judged
 from fmu_build.accuracy.histories import Histories, histories
-from fmu_build.flight.choices import BEST, FINEST, LAWS_TRIED, Choice, Model, reference_choices, variant_of
-from fmu_build.flight.flight import Workshop, are_numbers, build_all, keep, place_of, read, source_of
+from fmu_build.flight.choices import (
+    BEST,
+    FINEST,
+    Choice,
+    Model,
+    always_free,
+    kicked,
+    laws_of,
+    reference_choices,
+    variant_of,
+    while_free,
+)
+from fmu_build.flight.results import are_numbers, keep, place_of, read
+from fmu_build.flight.workshop import Workshop, build_all, source_of
 from fmu_build.trade.study import HALF_ULP
 from supervessel.equations import Equations, equations
-from supervessel.rotation.propagators import plan_of
-from supervessel.scene.schema import Accuracy, Law, Scene
+from supervessel.problems import AccuracyError
+from supervessel.scene.schema import Accuracy, Scene
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -34,7 +46,7 @@ MOST_ANGLES = 6
 
 
 @dataclass(frozen=True)
-class Errors:
+class FlightErrors:
     """Largest errors in each history, attitude [rad] and rate [rad/s]; the sub-steps of each.
 
     refused : the history that was not flown to its end, and why; then the others are empty
@@ -51,7 +63,7 @@ def _are_errors(kept: Any, histories: int) -> bool:
     columns = [kept[name] for name in ("attitude", "rate", "sub_steps")]
     refused, lengths = kept["refused"], {len(column) for column in columns}
     return (
-        kept.keys() == {one.name for one in fields(Errors)}
+        kept.keys() == {one.name for one in fields(FlightErrors)}
         and isinstance(refused, str | None)
         and lengths == {histories if refused is None else 0}
         and all(type(column) is list and are_numbers(column) for column in columns)
@@ -89,7 +101,7 @@ def begun(scene: Scene, accuracy: Accuracy, shop: Workshop, progress: Progress) 
     """
     one, other = reference_choices(scene, BEST)
     progress("two ways to the truth")
-    others = [finest(scene, Model(law)) for law in laws(scene)]
+    others = [finest(scene, Model(law)) for law in laws_of(scene)]
     build_all(scene, [one, other, *others], shop, lambda _: None)
     body = body_of(scene, shop.built[source_of(one)].model)
     every = histories(scene, accuracy, lambda inputs: judged(scene, shop, one, inputs), body)
@@ -107,11 +119,6 @@ def begun(scene: Scene, accuracy: Accuracy, shop: Workshop, progress: Progress) 
                 f"be had is {_up(least):g} {unit}"
             )
     return Search(scene, accuracy, shop, progress, every, truth, doubt, sub_steps)
-
-
-def laws(scene: Scene) -> list[Law]:
-    """Returns the laws that can be tried, cheapest first."""
-    return [law for law in LAWS_TRIED if not (law == "none" and scene.inputs.motion)]
 
 
 def finest(scene: Scene, model: Model) -> Choice:
@@ -175,7 +182,7 @@ class Search:
 
     def run(self) -> None:
         """Tries all candidates that may be cheaper than the best so far, cheap laws first."""
-        for law in laws(self.scene):
+        for law in laws_of(self.scene):
             self._law(Model(law))
 
     def _law(self, model: Model) -> None:
@@ -195,16 +202,13 @@ class Search:
         """Tries what follows free motion, as far as it suits the scene."""
         acts = any(low or high for low, high in self._acting_ranges())
         moves = bool(self.scene.inputs.motion)
-        names = [] if acts or moves else ["exact"]
-        if plan_of(variant_of(self.scene, Choice(model, "auto"))).free == "while free":
-            names.append("auto")
-        if acts and not moves and model.law != "none":
-            names.append("split")
+        names = [] if acts or moves else always_free()
+        names += while_free(self.scene, model) + (kicked(self.scene, model) if acts else [])
         for name in names:
             at_least = float(free_operations().again)
             if at_least >= self.limit:
                 self._leave(Choice(model, name), at_least)
-            elif name == "exact":
+            elif name in always_free():
                 self._is_tried(Choice(model, name))
             else:
                 self._by_tolerance(model, name)
@@ -238,7 +242,7 @@ class Search:
         rungs = [Choice(model, name, None, tolerance) for tolerance in TOLERANCES]
         low, high = 0, len(rungs)
         while low < high:
-            middle = low if name == "split" else (low + high) // 2
+            middle = low if name in kicked(self.scene, model) else (low + high) // 2
             limit = self.limit
             found = self.tried[rungs[middle]] if self._is_tried(rungs[middle]) else None
             if found is not None and found.operations < limit and found.excess(self.accuracy) > 1.0:
@@ -303,12 +307,12 @@ class Search:
     def _tried(self, choice: Choice) -> Tried:
         """Returns what comes of a candidate: of all histories, unless the telling ones say enough."""
         parts = range(self.every.telling), range(self.every.telling, len(self.every.flown))
-        found = Errors([], [], [])
+        found = FlightErrors([], [], [])
         for part in parts:
             more = self._errors(choice, part)
             if more.refused is not None:
                 return Tried(choice, self.least(choice), np.inf, np.inf, "", part.stop, more.refused)
-            found = Errors(
+            found = FlightErrors(
                 found.attitude + more.attitude, found.rate + more.rate, found.sub_steps + more.sub_steps
             )
             so_far = self._summed(choice, found)
@@ -316,7 +320,7 @@ class Search:
                 break
         return so_far
 
-    def _summed(self, choice: Choice, found: Errors) -> Tried:
+    def _summed(self, choice: Choice, found: FlightErrors) -> Tried:
         """Returns a candidate by its flights through the first histories."""
         count = len(found.attitude)
         attitude, rate = (
@@ -327,24 +331,24 @@ class Search:
         operations = self._operations(choice, found.sub_steps)
         return Tried(choice, operations, float(attitude.max()), float(rate.max()), worst, count)
 
-    def _errors(self, choice: Choice, part: range) -> Errors:
+    def _errors(self, choice: Choice, part: range) -> FlightErrors:
         """Returns the errors of a choice in some of the histories, kept by content."""
         if choice == reference_choices(self.scene, BEST)[0]:
-            return Errors([0.0] * len(part), [0.0] * len(part), self.sub_steps[part.start : part.stop])
+            return FlightErrors([0.0] * len(part), [0.0] * len(part), self.sub_steps[part.start : part.stop])
         if not part:
-            return Errors([], [], [])
+            return FlightErrors([], [], [])
         anything = self.accuracy.model_copy(update={"attitude": 1.0, "rate": None})
         flown_in = self.scene.model_copy(update={"accuracy": anything})  # whatever is asked of the flights
         place = place_of("accuracy", flown_in, ["errors", asdict(choice), part.start, part.stop])
         kept = read(place, lambda kept: _are_errors(kept, len(part)))
         if kept is not None:
-            return Errors(**kept)
+            return FlightErrors(**kept)
         flown = fly(self.scene, self.shop, self.every, choice, part)
         if isinstance(flown, str):
-            found = Errors([], [], [], flown)
+            found = FlightErrors([], [], [], flown)
         else:
             samples, sub_steps = flown
             attitude, rate = apart(samples, self.truth[part.start : part.stop])
-            found = Errors(attitude.tolist(), rate.tolist(), sub_steps)
+            found = FlightErrors(attitude.tolist(), rate.tolist(), sub_steps)
         keep(place, asdict(found))
         return found

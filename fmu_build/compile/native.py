@@ -7,6 +7,12 @@ from pathlib import Path
 
 import casadi as ca
 
+from fmu_build.compile.compiler import FLAGS, compile_library
+from fmu_build.errors import BuildError
+from fmu_build.generate.model import generate as scene_sources
+from fmu_build.generate.scene_files import generated
+from fmu_build.generate.sources import source_files
+from fmu_build.platforms import host_platform
 from supervessel.scene.schema import Scene
 from supervessel.shell.files import OutputError, check_output, write_file
 
@@ -42,8 +48,6 @@ def generate(
 
 def _write_source(source: str, file: Path) -> None:
     """Writes generated C. Raises BuildError if it cannot be written or would replace what is none."""
-    from fmu_build.errors import BuildError  # noqa: PLC0415
-
     file.parent.mkdir(parents=True, exist_ok=True)
     try:
         if check_output(file) and GENERATED not in file.read_bytes():
@@ -58,10 +62,6 @@ def communication_step(scene: Scene, folder: Path) -> ca.Function:
 
     The library is in folder. Raises BuildError if the compiler fails.
     """
-    # The FMU's C is of a package that is built on this one: looked up only here.
-    from fmu_build.build import generate as scene_sources  # noqa: PLC0415
-    from fmu_build.generate.sources import source_files  # noqa: PLC0415
-
     packed = source_files(scene_sources(scene, 3)[0], 3, scene.name)
     # The FMI functions are one version's entry points to what the step is made of here.
     files = {path: text for path, text in packed.items() if not path.startswith("sources/fmi")}
@@ -82,9 +82,6 @@ def _compiled(
     files : by relative path; `main` is the one that is compiled
     flags : beside those of FMUs
     """
-    from fmu_build.compile.compiler import FLAGS, compile_library  # noqa: PLC0415
-    from fmu_build.platforms import host_platform  # noqa: PLC0415
-
     folder.mkdir(parents=True, exist_ok=True)
     platform = host_platform()
     digest = hashlib.sha256()
@@ -107,8 +104,6 @@ def _compiled(
 
 def _source(functions: Sequence[ca.Function], file: str, derivatives: int) -> str:
     """Returns the C of functions and of what CasADi looks for when it differentiates an external one."""
-    from fmu_build.generate.scene_files import generated  # noqa: PLC0415
-
     generator = ca.CodeGenerator(file, {"verbose": False})
     for function in functions:
         generator.add(function, derivatives > 0)  # with the sparsity of its Jacobian

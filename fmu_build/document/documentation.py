@@ -6,7 +6,7 @@ from typing import Any
 from fmu_build.document.licences import licence_files
 from fmu_build.document.page import page
 from fmu_build.interface.terminals import terminal_icons
-from fmu_build.interface.variable_table import Entry
+from fmu_build.interface.variable_table import TableEntry
 from supervessel.drawing.drawing import drawing, icon
 from supervessel.drawing.figure import svg
 from supervessel.drawing.geometry import assembly
@@ -15,7 +15,7 @@ from supervessel.scene.schema import Scene
 
 
 def documentation(
-    scene: Scene, entries: Sequence[Entry], fmi: int, evidence: Mapping[str, Any] | None = None
+    scene: Scene, entries: Sequence[TableEntry], fmi: int, evidence: Mapping[str, Any] | None = None
 ) -> dict[str, bytes]:
     """Returns the files by their place in the archive; the same scene gives the same bytes.
 

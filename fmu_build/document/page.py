@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fmu_build.interface.variable_table import Entry, Role
+from fmu_build.interface.variable_table import Role, TableEntry
 from supervessel.composite.docks import joints, switchable
 from supervessel.drawing.geometry import Assembly
 from supervessel.reference import Composite
@@ -104,7 +104,7 @@ STATUS = {
 
 def page(
     parts: Assembly,
-    entries: Sequence[Entry],
+    entries: Sequence[TableEntry],
     fmi: int,
     picture: str,
     evidence: Mapping[str, Any] | None = None,
@@ -327,7 +327,7 @@ def _composite(whole: Composite) -> str:
     return _table("The whole at start values", (), rows)
 
 
-def _variables(entries: Sequence[Entry]) -> str:
+def _variables(entries: Sequence[TableEntry]) -> str:
     text = ""
     head = ("reference", "name", "unit", "start", "range", "description")
     for role, (title, remark) in ROLE_TITLES.items():
@@ -337,7 +337,7 @@ def _variables(entries: Sequence[Entry]) -> str:
     return text
 
 
-def _variable(entry: Entry) -> tuple[Cell, ...]:
+def _variable(entry: TableEntry) -> tuple[Cell, ...]:
     variable = entry.variable
     start = "" if variable.start is None else variable.start
     bounds = ((variable.low, "≥"), (variable.high, "≤"))

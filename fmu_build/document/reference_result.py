@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from fmu_build.interface.xml_text import xml_text
 from supervessel.equations import Equations, composite_slices, p_start
+from supervessel.scene.inputs import MASS, TORQUE
 from supervessel.scene.schema import Scene
-from supervessel.scene.variables import InputVariable, input_variables, output_names
+from supervessel.scene.variables import InputVariable
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
@@ -28,7 +29,7 @@ ATTEMPTS = 8
 Array = NDArray[np.float64]
 
 
-def reference_result(scene: Scene, model: Equations) -> dict[str, bytes]:
+def reference_result(model: Equations) -> dict[str, bytes]:
     """Returns the files of the reference result by their paths in the archive.
 
     Fifty steps from the scene's start, inputs moving linearly: masses lose up to a tenth within their
@@ -37,7 +38,8 @@ def reference_result(scene: Scene, model: Equations) -> dict[str, bytes]:
     scene's, or a tenth of them and so on where the body turns fast; a body that turns too fast for all of
     these has no reference result.
     """
-    inputs = input_variables(scene)
+    resolved, scene = model.resolved, model.resolved.scene
+    inputs = resolved.inputs
     first = np.zeros(len(inputs))
     first[: len(model.p_names)] = p_start(scene)
     step = scene.experiment.step if scene.experiment else DEFAULT_STEP
@@ -54,7 +56,7 @@ def reference_result(scene: Scene, model: Equations) -> dict[str, bytes]:
     else:
         return {}
     ends = np.column_stack([times[[0, -1]], np.vstack([first, last])])
-    outputs = output_names(scene)
+    outputs = resolved.output_names
     booleans = frozenset(variable.name for variable in inputs if variable.boolean)
     return {
         f"{FOLDER}/fmi-ls-manifest.xml": _manifest(),
@@ -84,9 +86,9 @@ def _last_inputs(
     last = []
     for variable, start in zip(inputs, first, strict=True):
         value = float(start)
-        if variable.name.endswith(".mass") and scene.keeps["mass"] == "rate":
+        if variable.kind is MASS and scene.keeps["mass"] == "rate":
             value = max(0.9 * value, variable.low or 0.0)
-        elif variable.group == "torque":
+        elif variable.kind is TORQUE:
             value = min(smallest * rate / duration, variable.high if variable.high is not None else np.inf)
             value = max(value, variable.low if variable.low is not None else -np.inf)
         last.append(value)

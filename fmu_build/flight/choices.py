@@ -6,7 +6,9 @@ from typing import Any, get_args
 
 from fmu_build.flight.experiment import acts, at_start, experiment_of
 from supervessel.loading import parse_scene
-from supervessel.rotation.propagators import plan_of
+from supervessel.rotation.propagators import PROPAGATORS, plan_of, stepping
+from supervessel.rotation.propagators.method import Propagator
+from supervessel.scene.inputs import Change, by_name, listed, part_of, vessel_of
 from supervessel.scene.schema import Law, Scene
 
 LAWS_TRIED: tuple[Law, ...] = get_args(Law)
@@ -21,8 +23,8 @@ FINEST = 1e-15
 
 SHOWN = ("attitude", "angular_velocity")
 
-FROZEN_KINDS = {"mass": ("mass", "pmi"), "pose": ("position", "direction", "alignment", "velocity", "rate")}
-"""What can be left at its start, and the last parts of its inputs' names."""
+FROZEN: dict[Change, str] = {"mass": "mass", "pose": "pose"}
+"""What can be left at its start, by the kind of change that it is then not, and its name in a trade."""
 
 
 @dataclass(frozen=True)
@@ -63,24 +65,27 @@ class Choice:
         return " ".join([f"{self.model},", self.propagator, *(f"{x:g}" for x in self.settings.values())])
 
 
+def laws_of(scene: Scene) -> list[Law]:
+    """Returns the laws that make sense in a scene, cheapest first."""
+    return [law for law in LAWS_TRIED if not (law == "none" and scene.inputs.motion)]
+
+
 def models(scene: Scene, *, quick: bool) -> list[Model]:
     """Returns the models that a scene and its experiment make sense of, cheapest first, the best last."""
-    laws = [law for law in LAWS_TRIED if not (law == "none" and scene.inputs.motion)]
+    laws = laws_of(scene)
     if quick:
         laws = [law for law in laws if law in ("principal", "tensor")]
-    moved = [kind for kind in FROZEN_KINDS if moved_inputs(scene, kind)]
+    moved = [kind for kind in FROZEN if moved_inputs(scene, kind)]
     return [Model(law, frozen) for law in laws for frozen in (*(moved if law != "none" else ()), "")]
 
 
-def moved_inputs(scene: Scene, kind: str) -> list[str]:
-    """Returns the inputs of a kind that leave their value at the start; none of docks that close."""
-    closing = tuple(f"{name}." for name in scene.inputs.docked)
+def moved_inputs(scene: Scene, change: Change) -> list[str]:
+    """Returns the inputs of a kind of change that leave their value at the start."""
+    known = by_name(dict(scene.inputs))
     return [
         name
         for name, rows in experiment_of(scene).inputs.items()
-        if len({value for _, value in rows}) > 1
-        and name.rpartition(".")[2].partition("[")[0] in FROZEN_KINDS[kind]
-        and not name.startswith(closing)
+        if known[name].change == change and len({value for _, value in rows}) > 1
     ]
 
 
@@ -89,25 +94,53 @@ def reference_choices(scene: Scene, model: Model) -> tuple[Choice, Choice]:
 
     Series do not know parts that move: there the second is the first at ten times the tolerance.
     """
-    if scene.inputs.motion:
-        return Choice(model, "dop853", None, FINEST), Choice(model, "dop853", None, 10.0 * FINEST)
-    return Choice(model, "taylor", None, FINEST), Choice(model, "dop853", None, FINEST)
+    first, second = stepping(scene), "dop853"
+    return Choice(model, first, None, FINEST), Choice(
+        model, second, None, FINEST if first != second else 10.0 * FINEST
+    )
 
 
 def by_tolerance(scene: Scene, model: Model, *, quick: bool) -> Iterator[Choice]:
     """Yields what is tried of a model besides rk4."""
     tolerances = QUICK_TOLERANCES if quick else TOLERANCES
-    moves, torque = bool(scene.inputs.motion), acts(scene)
-    variant = variant_of(scene, Choice(model, "auto"))
-    names = ["dop853", *([] if moves else ["taylor"])]
-    if plan_of(variant).free == "while free":
-        names.append("auto")
-    if torque and not moves and model.law != "none":
-        names.append("split")
-    for name in names:
+    torque = acts(scene)
+    for name in (
+        *stepped(scene, model),
+        *while_free(scene, model),
+        *(kicked(scene, model) if torque else ()),
+    ):
         yield from (Choice(model, name, None, tolerance) for tolerance in tolerances)
-    if not torque and not moves:
-        yield Choice(model, "exact")
+    if not torque and not scene.inputs.motion:
+        yield from (Choice(model, name) for name in always_free())
+
+
+def stepped(scene: Scene, model: Model) -> list[str]:
+    """Returns the methods that suit a scene and control the error of steps through any motion."""
+    return [
+        name for name, row in _suiting(scene, model) if row.setting == "tolerance" and row.free == "never"
+    ]
+
+
+def while_free(scene: Scene, model: Model) -> list[str]:
+    """Returns "auto", where it is more than another name of one method."""
+    variant = variant_of(scene, Choice(model, "auto"))
+    return ["auto"] if plan_of(variant).free == "while free" else []
+
+
+def kicked(scene: Scene, model: Model) -> list[str]:
+    """Returns the methods that suit a scene and take a torque as kicks between pieces of free motion."""
+    return [name for name, row in _suiting(scene, model) if row.free == "between kicks"]
+
+
+def always_free() -> list[str]:
+    """Returns the methods that know free motion alone."""
+    return [name for name, row in PROPAGATORS.items() if row.free == "always"]
+
+
+def _suiting(scene: Scene, model: Model) -> list[tuple[str, Propagator]]:
+    """Returns the methods that make sense with a scene's inputs under a model, by name."""
+    inputs = dict(scene.inputs)
+    return [(name, row) for name, row in PROPAGATORS.items() if not row.suits(model.law, inputs)]
 
 
 def by_angle(model: Model, *, quick: bool) -> list[Choice]:
@@ -134,32 +167,27 @@ def variant_of(scene: Scene, choice: Choice) -> Scene:
     return parse_scene(raw, scene.name)
 
 
-def _freeze(raw: dict[str, Any], kind: str, start: Mapping[str, float]) -> None:
-    """Makes constants of the inputs of a kind, with the experiment's values at its start."""
+def _freeze(raw: dict[str, Any], change: str, start: Mapping[str, float]) -> None:
+    """Makes constants of the inputs of a kind of change, with the experiment's values at its start."""
     inputs, vessels = raw["inputs"], raw["vessels"]
+    frozen = {
+        name: (kind, owner, element)
+        for kind, owner in listed(inputs)
+        if kind.change == change
+        for element, name in enumerate(kind.names(owner))
+    }
     for name, value in start.items():
-        owner, _, last = name.rpartition(".")
-        part, _, index = last.rstrip("]").partition("[")
-        if part not in FROZEN_KINDS[kind] or owner in inputs.get("docked", ()):
-            continue
-        vessel, _, port = owner.partition(".")
-        table = vessels[vessel]["ports"][port] if port else vessels[vessel]
-        if not index:
-            table[part] = value
-        elif part in table:  # a velocity is zero where it is no input
-            table[part] = tuple(value if i == int(index) else x for i, x in enumerate(table[part], start=1))
-    gone = {"mass": ("mass", "pmi"), "pose": ("pose", "motion")}[kind]
-    inputs |= dict.fromkeys(gone, ())
-    kept = {n: b for n, b in inputs["range"].items() if _kind_of(n, inputs) != kind}
-    inputs["range"] = kept
+        if name in frozen:
+            kind, owner, element = frozen[name]
+            vessel = vessels[vessel_of(owner)]
+            table = vessel["ports"][part_of(owner)[1]] if kind.owner == "port" else vessel
+            if not kind.elements:
+                table[kind.quantity] = value
+            elif kind.quantity in table:  # a velocity is zero where it is no input
+                old = table[kind.quantity]
+                table[kind.quantity] = tuple(value if i == element else x for i, x in enumerate(old))
+    groups = {kind.group(owner) for kind, owner, _ in frozen.values()}
+    inputs |= dict.fromkeys({kind.key for kind, _, _ in frozen.values()}, ())
+    inputs["range"] = {n: b for n, b in inputs["range"].items() if n not in frozen and n not in groups}
     courses = raw["experiment"]["inputs"]
-    raw["experiment"]["inputs"] = {n: rows for n, rows in courses.items() if _kind_of(n, inputs) != kind}
-
-
-def _kind_of(name: str, inputs: Mapping[str, Any]) -> str:
-    """Returns which kind an input is of, "" where it is of none that can be left at its start."""
-    owner, _, last = name.rpartition(".")
-    part = last.partition("[")[0]
-    if owner in inputs.get("docked", ()):
-        return ""
-    return next((kind for kind, parts in FROZEN_KINDS.items() if part in parts), "")
+    raw["experiment"]["inputs"] = {n: rows for n, rows in courses.items() if n not in frozen}

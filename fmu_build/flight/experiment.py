@@ -7,7 +7,8 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from supervessel.problems import shown_message
+from supervessel.problems import TradeError
+from supervessel.scene.inputs import by_name
 from supervessel.scene.schema import MOST_STEPS, Experiment, Scene
 
 Array = NDArray[np.float64]
@@ -20,16 +21,6 @@ SAMPLES = 100
 
 HORIZONS = (100.0, 10.0, 1.0)
 """What the duration is divided by for the times up to which errors are given."""
-
-ACTIONS = ("torque", "force")
-"""Last parts of the names of inputs that act."""
-
-
-class TradeError(RuntimeError):
-    """A trade that cannot be made; the message says why, in lines that can be shown."""
-
-    def __init__(self, message: str) -> None:
-        super().__init__(shown_message(message))
 
 
 @dataclass(frozen=True)
@@ -84,7 +75,7 @@ def course_of(scene: Scene) -> Course:
     last_size = experiment.duration - (steps - 1) * experiment.step
     if abs(last_size - experiment.step) <= SLACK * experiment.step:
         last_size = experiment.step
-    docks = {f"{name}.docked" for name in scene.inputs.docked}
+    docks = {name for name, kind in by_name(dict(scene.inputs)).items() if kind.boolean}
     moving = {name: rows for name, rows in experiment.inputs.items() if name not in docks}
     switched = {name: rows for name, rows in experiment.inputs.items() if name in docks}
     sampled: set[int] = set()
@@ -134,10 +125,10 @@ def rows_at_start(rows: Iterable[tuple[float, float]]) -> float:
 
 def acts(scene: Scene) -> bool:
     """Whether a torque or force other than 0 acts at some time."""
-    named = experiment_of(scene).inputs.items()
+    known = by_name(dict(scene.inputs))
     return any(
         value != 0.0
-        for name, rows in named
-        if name.rpartition(".")[2].partition("[")[0] in ACTIONS
+        for name, rows in experiment_of(scene).inputs.items()
+        if known[name].part == "action"
         for _, value in rows
     )

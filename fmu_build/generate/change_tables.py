@@ -1,13 +1,13 @@
 """C tables of what may change while a scene runs: the kinds of its inputs, and its docks."""
 
 from supervessel.equations import Equations
-from supervessel.rotation.changes import kind_of_change
-from supervessel.scene.schema import Scene, keeps_momentum
-from supervessel.scene.variables import input_variables
+from supervessel.scene.inputs import vessel_of
+from supervessel.scene.schema import keeps_momentum
 
 
-def change_constants(scene: Scene, model: Equations) -> dict[str, int]:
+def change_constants(model: Equations) -> dict[str, int]:
     """Returns what the C layer must know of a scene's changes, by name of the macro."""
+    scene = model.resolved.scene
     keeps = scene.keeps
     return {
         "CHANGES": int(model.change is not None),
@@ -21,21 +21,21 @@ def change_constants(scene: Scene, model: Equations) -> dict[str, int]:
     }
 
 
-def change_tables(scene: Scene, model: Equations) -> str:
+def change_tables(model: Equations) -> str:
     """Returns the tables that go with `change_constants`, C; empty where nothing changes the rate."""
-    text = ""
+    text, resolved = "", model.resolved
     if model.change is not None:
-        shaping = (variable for variable in input_variables(scene) if variable.part == "shape")
-        kinds = ", ".join(f"KIND_{kind_of_change(variable.group).upper()}" for variable in shaping)
+        kinds = ", ".join(f"KIND_{variable.kind.change.upper()}" for variable in resolved.shaping)
         text += f"\nconst unsigned char INPUT_KINDS[INPUT_P_COUNT] = {{{kinds}}};\n"
-    if scene.inputs.docked:
-        rows = "\n".join(f"    {row}," for row in _dock_rows(scene, model))
+    if resolved.contact:
+        rows = "\n".join(f"    {row}," for row in _dock_rows(model))
         text += f"\nconst Dock DOCKS[DOCK_COUNT] = {{\n{rows}\n}};\n"
     return text
 
 
-def _dock_rows(scene: Scene, model: Equations) -> list[str]:
+def _dock_rows(model: Equations) -> list[str]:
     """Returns a row for each dock: its ports, their vessels, where its input and its motion stand."""
+    scene = model.resolved.scene
     vessels = {name: number for number, name in enumerate(scene.vessels)}
     rows = []
     for dock in scene.docks:
@@ -44,7 +44,7 @@ def _dock_rows(scene: Scene, model: Equations) -> list[str]:
         if dock.name is not None and dock.name in scene.inputs.docked:
             flag = model.p_names.index(f"{dock.name}.docked")
             motion = model.k_names.index(f"{dock.name}.velocity[1]")
-        names = [name.partition(".")[0] for name in (one, other)]
+        names = [vessel_of(name) for name in (one, other)]
         numbers = f"{vessels[names[0]]}, {vessels[names[1]]}, {flag}, {motion}"
         rows.append(f'{{"{one}", "{other}", "{names[0]}", "{names[1]}", {numbers}}}')
     return rows

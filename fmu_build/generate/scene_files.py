@@ -12,15 +12,14 @@ import casadi as ca
 from fmu_build.errors import BuildError
 from fmu_build.generate.change_tables import change_constants
 from fmu_build.generate.vessel_loop import Tables, loop_constants
-from fmu_build.interface.variable_table import Entry
+from fmu_build.interface.variable_table import TableEntry
 from fmu_build.storage.cache import reason
 from fmu_build.storage.temporary import temporary_folder
 from supervessel.equations import Equations
 from supervessel.problems import printable
 from supervessel.rotation.propagators.free_motion import FIRST_ANGLE, LARGEST_TURN
 from supervessel.rotation.propagators.theta import CONSTANTS
-from supervessel.scene.schema import Scene
-from supervessel.scene.variables import InputVariable
+from supervessel.scene.variables import InputVariable, OutputVariable, Variable
 
 CHOICES = {
     "STEPS_NONE": 0,
@@ -77,9 +76,8 @@ def _without_null_checks(source: str) -> str:
 
 
 def scene_header(
-    scene: Scene,
     model: Equations,
-    entries: Sequence[Entry],
+    entries: Sequence[TableEntry],
     functions: Iterable[ca.Function],
     loop: Tables | None,
 ) -> str:
@@ -88,7 +86,7 @@ def scene_header(
     functions : those of model.c
     loop      : tables of the composite's loop
     """
-    where = model.slices
+    scene, where = model.resolved.scene, model.slices
     references = {entry.variable.name: entry.reference for entry in entries}
     p_count, k_count, u_count = len(model.p_names), len(model.k_names), len(model.u_names)
     sizes = [(f.sz_arg(), f.sz_res(), f.sz_iw(), f.sz_w()) for f in functions]
@@ -130,7 +128,7 @@ def scene_header(
     plan = model.plan
     macros = {
         "AXES_COUNT": model.axes.numel_out(0),
-        **change_constants(scene, model),
+        **change_constants(model),
         **loop_constants(loop),
         "STEPS": f"STEPS_BY_{plan.method.control.upper()}" if plan.method else "STEPS_NONE",
         "FREE": f"FREE_{plan.free.upper().replace(' ', '_')}",
@@ -157,7 +155,7 @@ def _lines(form: str, values: Mapping[str, object]) -> str:
     return "\n".join(form.format(name, value) for name, value in values.items())
 
 
-def scene_source(entries: Sequence[Entry], token: str, changing: bool) -> str:
+def scene_source(entries: Sequence[TableEntry], token: str, changing: bool) -> str:
     """Returns scene.c: the variable table with start values, and the token.
 
     changing : whether a change of inputs makes the states other ones
@@ -176,18 +174,23 @@ def scene_source(entries: Sequence[Entry], token: str, changing: bool) -> str:
     )
 
 
-def _needs(entry: Entry, changing: bool) -> frozenset[str]:
+def _needs(entry: TableEntry, changing: bool) -> frozenset[str]:
     """Returns what must be current before that which follows from a variable can be read."""
     if entry.role == "state" and "attitude" in entry.variable.name:
         return frozenset({"STATES", "ATTITUDE"})
     if entry.role == "state":
         return frozenset({"STATES", "COMPOSITE"} if changing else {"STATES"})
-    if isinstance(entry.variable, InputVariable) and entry.role == "input" and entry.variable.part == "shape":
+    if isinstance(entry.variable, InputVariable) and entry.variable.part == "shape":
         return frozenset({"COMPOSITE"})
     return frozenset()
 
 
-def _row(entry: Entry, needs: Mapping[int, frozenset[str]], typed: bool) -> str:
+def _shows_axes(variable: Variable) -> bool:
+    """Whether a variable shows principal moments or axes."""
+    return isinstance(variable, OutputVariable) and variable.kind.axes
+
+
+def _row(entry: TableEntry, needs: Mapping[int, frozenset[str]], typed: bool) -> str:
     """Returns a row of the table.
 
     needs : those of all variables by reference
@@ -195,7 +198,7 @@ def _row(entry: Entry, needs: Mapping[int, frozenset[str]], typed: bool) -> str:
     """
     variable = entry.variable
     own = {
-        "output": frozenset({"OUTPUTS", "AXES"} if "principal" in variable.group else {"OUTPUTS"}),
+        "output": frozenset({"OUTPUTS", "AXES"} if _shows_axes(variable) else {"OUTPUTS"}),
         "derivative": frozenset({"RATES"}),
         "state": needs[entry.reference],
     }
@@ -213,16 +216,11 @@ def _row(entry: Entry, needs: Mapping[int, frozenset[str]], typed: bool) -> str:
     return "{" + ", ".join(fields) + "}"
 
 
-def _check(entry: Entry) -> str:
+def _check(entry: TableEntry) -> str:
     """Returns which check stands at a variable: at the first of those that are judged together."""
-    if entry.role == "input":
-        for ending, check in (
-            (".mass", "CHECK_MASS"),
-            (".pmi[1]", "CHECK_PMI"),
-            (".direction[1]", "CHECK_PORT"),
-        ):
-            if entry.variable.name.endswith(ending):
-                return check
+    variable = entry.variable
+    if isinstance(variable, InputVariable) and variable.element == 0 and variable.kind.judge:
+        return f"CHECK_{variable.kind.judge}"
     return "CHECK_NONE"
 
 

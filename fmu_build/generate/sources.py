@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-LAYER = Path(__file__).parent / "c"
+LAYER = Path(__file__).parents[1] / "c"
 """The scene-independent C."""
 
 OTHER_VERSION = {2: "fmi3", 3: "fmi2"}

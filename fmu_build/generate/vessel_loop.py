@@ -7,12 +7,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from supervessel.composite.actions import vessels_shown
 from supervessel.composite.chain import kernels, lane_kernels
-from supervessel.composite.constants import Places, constant_and_varying, lump, places, seen_in_group
-from supervessel.composite.docks import groups, ways
+from supervessel.composite.constants import seen_in_group
 from supervessel.composite.inertia import UPPER_TRIANGLE
 from supervessel.composite.poses import scaled
+from supervessel.composite.resolved import ResolvedScene, RigidGroup
 from supervessel.equations import Equations
 from supervessel.scene.schema import Scene
 
@@ -78,34 +77,34 @@ class Tables:
         return 12 * (2 * frames + 2 * LANES) + 19 * bodies + 3 + 2 * (4 + 3 + 6)
 
 
-def loop_tables(scene: Scene, model: Equations) -> Tables | None:
+def loop_tables(model: Equations) -> Tables | None:
     """Returns the tables of a scene whose composite is a loop; None for one that is short or needs more.
 
     Docks that open, ports with velocities, and what is known of single vessels are for straight code alone.
     """
+    resolved, scene = model.resolved, model.resolved.scene
     inputs = scene.inputs
-    if model.composite.n_instructions() <= LONGEST_CODE or vessels_shown(scene):
+    if model.composite.n_instructions() <= LONGEST_CODE or resolved.vessels_shown:
         return None
     if inputs.docked or inputs.motion or inputs.force or inputs.vessel_torque:
         return None
     tables = Tables()
     where = {name: place for place, name in enumerate(model.p_names)}
-    parts = groups(scene)
-    inside = places(scene, parts)
-    home = {vessel: number for number, part in enumerate(parts) for vessel in part.vessels}
-    seen = _varying_bodies(scene, inside)
-    for number, (way,) in enumerate(ways(scene, parts)):
+    numbers = {vessel: number for number, group in enumerate(resolved.groups) for vessel in group.inside}
+    seen = _varying_bodies(resolved)
+    for number, group in enumerate(resolved.groups):
+        (way,) = group.ways
         if way.joint is None:
             tables.frames.append(f"{{FRAME_ROOT, 0, 0, {NOWHERE}, {NOWHERE}}}")
         else:
-            joint, parent = way.joint, home[way.joint.parent]
+            joint, parent = way.joint, numbers[way.joint.parent]
             ports = ", ".join(_port(scene, name, where, tables) for name in joint.ports)
-            is_first = parts[parent].reference == joint.parent
+            is_first = resolved.groups[parent].reference == joint.parent
             kind = "FRAME_FIRST" if is_first else "FRAME_INSIDE"
-            pose = inside[parent][joint.parent]
+            pose = resolved.groups[parent].inside[joint.parent]
             at = 0 if is_first else tables.hold(pose.rotation, pose.origin)
             tables.frames.append(f"{{{kind}, {_pose_at(parent)}, {at}, {ports}}}")
-        for row in _bodies(scene, number, inside[number], seen, where, tables):
+        for row in _bodies(scene, number, group, seen, where, tables):
             _add_body(row, tables)
     _fill_up(tables)
     return tables
@@ -151,38 +150,38 @@ Seen = dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
 """Centre (3,) [m] and tensor over mass (3, 3) [m2] of vessels, each in the axes of its group."""
 
 
-def _varying_bodies(scene: Scene, inside: Sequence[Places]) -> Seen:
-    """Returns the vessels that vary, of all groups.
-
-    inside : poses of the vessels of each group
-    """
-    placed = {name: poses[name] for poses in inside for name in constant_and_varying(scene, poses)[1]}
-    return dict(zip(placed, zip(*seen_in_group(scene, placed), strict=True), strict=True)) if placed else {}
+def _varying_bodies(resolved: ResolvedScene) -> Seen:
+    """Returns the vessels that vary, of all groups."""
+    placed = {name: group.inside[name] for group in resolved.groups for name in group.varying}
+    return (
+        dict(zip(placed, zip(*seen_in_group(resolved.scene, placed), strict=True), strict=True))
+        if placed
+        else {}
+    )
 
 
 def _bodies(  # noqa: PLR0913, PLR0917
-    scene: Scene, frame: int, inside: Places, seen: Seen, where: dict[str, int], tables: Tables
+    scene: Scene, frame: int, group: RigidGroup, seen: Seen, where: dict[str, int], tables: Tables
 ) -> list[Row]:
     """Returns the rows of a group's bodies: what is constant, then vessels that vary."""
     rows = []
     kind = "BODY" if frame else "BODY_OWN"
-    constants, varying = constant_and_varying(scene, inside)
-    if constants:
-        mass, centre, inertia = lump(scene, {name: inside[name] for name in constants})
+    if group.fixed is not None:
+        mass, centre, inertia = group.fixed
         rows.append(Row(f"{kind}_FIXED", frame, _constant(tables.hold(mass)), _body(centre, inertia)))
-    for name in varying:
+    for name in group.varying:
         vessel = scene.vessels[name]
         given = f"{name}.mass" in where
         mass_at = _input(where[f"{name}.mass"]) if given else _constant(tables.hold(vessel.mass))
         moments_at = _input(where[f"{name}.pmi[1]"]) if name in scene.inputs.pmi else NOWHERE
         centre, specific = seen[name]
-        own_axes = frame > 0 and name == next(iter(inside)) and not any(vessel.centre_of_mass)
+        own_axes = frame > 0 and name == group.reference and not any(vessel.centre_of_mass)
         if own_axes and name in scene.inputs.pmi:
             rows.append(Row("BODY_DIAGONAL_FREE", frame, mass_at, moments=moments_at))
         elif own_axes and vessel.pmi is not None:
             rows.append(Row("BODY_DIAGONAL", frame, mass_at, vessel.pmi))
         elif name in scene.inputs.pmi:
-            rotation = np.ravel(np.array(ca.evalf(inside[name].rotation)), order="F")
+            rotation = np.ravel(np.array(ca.evalf(group.inside[name].rotation)), order="F")
             rows.append(Row(f"{kind}_FREE", frame, mass_at, [*rotation, *centre], moments_at))
         else:
             rows.append(Row(f"{kind}_SCALED", frame, mass_at, _body(centre, specific)))
@@ -207,9 +206,9 @@ def _body_rows(tables: Tables) -> list[str]:
     return rows
 
 
-def loop_functions(scene: Scene, model: Equations) -> list[ca.Function]:
+def loop_functions(model: Equations) -> list[ca.Function]:
     """Returns what the FMU needs where its composite is a loop."""
-    return [*model.functions_beside_composite, *kernels(scene)]
+    return [*model.functions_beside_composite, *kernels(model.resolved.scene)]
 
 
 def loop_steps(scene: Scene, tables: Tables | None) -> str:

@@ -6,7 +6,7 @@ from importlib.metadata import version
 from math import degrees
 from xml.etree import ElementTree as ET
 
-from fmu_build.interface.variable_table import Dependency, Entry, Role
+from fmu_build.interface.variable_table import Dependency, Role, TableEntry
 from fmu_build.interface.xml_text import xml_text
 from supervessel.scene.schema import Scene
 
@@ -73,7 +73,7 @@ COMMON_CAPABILITIES_3 = {
 
 
 def model_description(
-    scene: Scene, entries: Sequence[Entry], token: str, fmi: int, sources: Sequence[str] = ()
+    scene: Scene, entries: Sequence[TableEntry], token: str, fmi: int, sources: Sequence[str] = ()
 ) -> bytes:
     """Returns the text of modelDescription.xml.
 
@@ -110,7 +110,7 @@ def _description(scene: Scene) -> str:
     return f"Rotation of {scene.root}{docked}, law {scene.rotation.law}"
 
 
-def _fmi3(scene: Scene, entries: Sequence[Entry], token: str) -> ET.Element:
+def _fmi3(scene: Scene, entries: Sequence[TableEntry], token: str) -> ET.Element:
     root = _header(scene, "3.0", "instantiationToken", token)
     identifier = {"modelIdentifier": scene.name}
     ET.SubElement(root, "ModelExchange", identifier | COMMON_CAPABILITIES_3)
@@ -146,7 +146,7 @@ def _fmi3(scene: Scene, entries: Sequence[Entry], token: str) -> ET.Element:
     return root
 
 
-def _fmi2(scene: Scene, entries: Sequence[Entry], token: str, sources: Sequence[str]) -> ET.Element:
+def _fmi2(scene: Scene, entries: Sequence[TableEntry], token: str, sources: Sequence[str]) -> ET.Element:
     root = _header(scene, "2.0", "guid", token)
     identifier = {"modelIdentifier": scene.name}
     exchange = {"completedIntegratorStepNotNeeded": "true"}
@@ -182,16 +182,18 @@ def _fmi2(scene: Scene, entries: Sequence[Entry], token: str, sources: Sequence[
     return root
 
 
-def _of(entries: Sequence[Entry], *roles: Role) -> list[Entry]:
+def _of(entries: Sequence[TableEntry], *roles: Role) -> list[TableEntry]:
     return [entry for entry in entries if entry.role in roles]
 
 
-def _state_of(derivative: Entry, entries: Sequence[Entry]) -> Entry:
+def _state_of(derivative: TableEntry, entries: Sequence[TableEntry]) -> TableEntry:
     """Returns the state that a derivative is the rate of."""
     return next(entry for entry in entries if f"der({entry.variable.name})" == derivative.variable.name)
 
 
-def _unknown3(structure: ET.Element, name: str, entry: Entry, dependencies: Sequence[Dependency]) -> None:
+def _unknown3(
+    structure: ET.Element, name: str, entry: TableEntry, dependencies: Sequence[Dependency]
+) -> None:
     attributes = {"valueReference": str(entry.reference)} | _dependencies(dependencies)
     ET.SubElement(structure, name, attributes)
 
@@ -203,7 +205,7 @@ def _dependencies(dependencies: Sequence[Dependency], offset: int = 0) -> dict[s
     }
 
 
-def _units(root: ET.Element, entries: Sequence[Entry]) -> None:
+def _units(root: ET.Element, entries: Sequence[TableEntry]) -> None:
     used = {entry.variable.unit for entry in entries}
     definitions = ET.SubElement(root, "UnitDefinitions")
     for name, unit in UNITS.items():
@@ -215,7 +217,7 @@ def _units(root: ET.Element, entries: Sequence[Entry]) -> None:
                 ET.SubElement(element, "DisplayUnit", name=display, factor=repr(factor))
 
 
-def _types(root: ET.Element, entries: Sequence[Entry], tag: str) -> None:
+def _types(root: ET.Element, entries: Sequence[TableEntry], tag: str) -> None:
     """Writes the declared types; FMI 2.0 nests the attributes in an element of their own."""
     used = {entry.variable.unit for entry in entries}
     definitions = ET.SubElement(root, "TypeDefinitions")
@@ -251,7 +253,7 @@ def _experiment(root: ET.Element, scene: Scene) -> None:
         )
 
 
-def _identity(entry: Entry) -> dict[str, str]:
+def _identity(entry: TableEntry) -> dict[str, str]:
     return {
         "name": entry.variable.name,
         "valueReference": str(entry.reference),
@@ -259,12 +261,12 @@ def _identity(entry: Entry) -> dict[str, str]:
     }
 
 
-def _role(entry: Entry) -> dict[str, str]:
+def _role(entry: TableEntry) -> dict[str, str]:
     """Returns causality, variability and initial of a variable."""
     return ROLES[entry.role] | ({"variability": "discrete"} if entry.variable.boolean else {})
 
 
-def _type_attributes(entry: Entry) -> dict[str, str]:
+def _type_attributes(entry: TableEntry) -> dict[str, str]:
     """Returns type, unit, range and start of a variable, as both versions of FMI write them."""
     variable = entry.variable
     if variable.boolean:

@@ -8,17 +8,16 @@ from dataclasses import dataclass
 from math import cos, pi, sin
 from xml.etree import ElementTree as ET
 
-from fmu_build.interface.variable_table import Entry
+from fmu_build.interface.variable_table import TableEntry
 from fmu_build.interface.xml_text import xml_text
 from supervessel.drawing.figure import Figure, Item, Path, arrow, regular_polygon, svg
 from supervessel.drawing.raster import png
+from supervessel.scene.inputs import vessel_of
 from supervessel.scene.schema import Scene
+from supervessel.scene.variables import InputVariable
 
 FILE_VERSION = {2: "3.0", 3: "3.0"}
 """The file's fmiVersion by that of the FMU: the version that defines the file."""
-
-POSE = ("position", "direction", "alignment")
-MOTION = ("velocity", "rate")
 
 ICON_EXTENT = 100.0
 """The FMU's icon fills the square from -100 to 100, the coordinates that FMI takes by default."""
@@ -40,7 +39,7 @@ class Terminal:
     kind: str
     rule: str
     description: str
-    members: Sequence[Entry]
+    members: Sequence[TableEntry]
     prefix: str = ""
 
     @property
@@ -49,51 +48,70 @@ class Terminal:
         return all(entry.role == "input" for entry in self.members)
 
 
-def terminals(scene: Scene, entries: Sequence[Entry]) -> list[Terminal]:
+@dataclass(frozen=True)
+class Connection:
+    """What the inputs of one owner are together.
+
+    kind        : of the terminal
+    description : of it; {owner}, {vessel} and, of a dock, {ports} are filled in
+    name        : of it
+    """
+
+    kind: str
+    description: str
+    name: str = "{owner}"
+
+
+MOVING_PORT = Connection("port_motion", "pose and motion of docking port {owner} in the axes of {vessel}")
+
+CONNECTIONS: dict[str, Connection | None] = {
+    "mass": None,
+    "pmi": None,
+    "pose": Connection("port_pose", "pose of docking port {owner} in the axes of {vessel}"),
+    "docked": Connection("dock", "whether {ports} are docked, motion at contact"),
+    "force": Connection("force", "external force at {owner}, axes of its vessel"),
+    "vessel_torque": Connection("torque", "external torque on {owner}, its axes", "{owner}.torque"),
+    "torque": Connection("torque", "external torque about the barycentre, body axes", "torque"),
+}
+"""Terminals of inputs by the key of `[inputs]`; None: no terminal. A key that is not here has one of its own
+kind."""
+
+
+def terminals(scene: Scene, entries: Sequence[TableEntry]) -> list[Terminal]:
     """Returns the terminals of a scene: ports whose pose is an input, docks, forces, torques, attitude."""
-
-    by_group: dict[tuple[str, str], list[Entry]] = {}
+    together: dict[tuple[str, str], list[TableEntry]] = {}
     for entry in entries:
-        by_group.setdefault((entry.role, entry.variable.group), []).append(entry)
+        variable = entry.variable
+        if isinstance(variable, InputVariable):
+            key = variable.kind.within or variable.kind.key
+            together.setdefault((key, variable.owner), []).append(entry)
+    found = [_of_inputs(scene, key, owner, members) for (key, owner), members in together.items()]
+    shown = [entry for entry in entries if entry.role == "output"]
+    attitude = [entry for entry in shown if entry.variable.group in ("attitude", "angular_velocity")]
+    whole = Terminal("attitude", "attitude", "bus", "attitude and angular velocity of the body", attitude)
+    known = [terminal for terminal in found if terminal is not None]
+    known.sort(key=lambda terminal: terminal.name == "torque")  # that of the whole comes after those of parts
+    return [*known, whole] if attitude else known
 
-    def members_of(role: str, *groups: str) -> list[Entry]:
-        """Returns the variables of a role whose group is among these, in the table's order."""
-        members = [entry for group in groups for entry in by_group.get((role, group), ())]
-        return sorted(members, key=lambda entry: entry.reference)
 
-    def inputs(owner: str, kind: str, description: str, *parts: str, name: str = "") -> Terminal:
-        members = members_of("input", *(f"{owner}.{part}" for part in parts))
-        return Terminal(name or owner, kind, "plug", description, members, prefix=f"{owner}.")
-
-    found = []
-    for port in scene.inputs.pose:
-        place = f"of docking port {port} in the axes of {port.partition('.')[0]}"
-        if port in scene.inputs.motion:
-            found.append(inputs(port, "port_motion", f"pose and motion {place}", *POSE, *MOTION))
-        else:
-            found.append(inputs(port, "port_pose", f"pose {place}", *POSE))
-    for dock in scene.inputs.docked:
-        ports = " and ".join(scene.dock(dock).ports)
-        found.append(
-            inputs(dock, "dock", f"whether {ports} are docked, motion at contact", "docked", *MOTION)
-        )
-    for point in scene.inputs.force:
-        found.append(inputs(point, "force", f"external force at {point}, axes of its vessel", "force"))
-    for vessel in scene.inputs.vessel_torque:
-        what = f"external torque on {vessel}, its axes"
-        found.append(inputs(vessel, "torque", what, "torque", name=f"{vessel}.torque"))
-    torque = members_of("input", "torque")
-    attitude = members_of("output", "attitude", "angular_velocity")
-    found.append(
-        Terminal("torque", "torque", "plug", "external torque about the barycentre, body axes", torque)
+def _of_inputs(scene: Scene, key: str, owner: str, members: Sequence[TableEntry]) -> Terminal | None:
+    """Returns the terminal of an owner's inputs, None where such inputs have none."""
+    generic = Connection(
+        key, key.replace("_", " ") + (" of {owner}" if owner else ""), "{owner}." + key if owner else key
     )
-    found.append(
-        Terminal("attitude", "attitude", "bus", "attitude and angular velocity of the body", attitude)
-    )
-    return [terminal for terminal in found if terminal.members]
+    connection = CONNECTIONS.get(key, generic)
+    if connection is None:
+        return None
+    if owner in scene.inputs.motion:
+        connection = MOVING_PORT
+    words = {"owner": owner, "vessel": vessel_of(owner)}
+    if key == "docked":
+        words["ports"] = " and ".join(scene.dock(owner).ports)
+    name, text = connection.name.format(**words), connection.description.format(**words)
+    return Terminal(name, connection.kind, "plug", text, members, prefix=f"{owner}." if owner else "")
 
 
-def terminals_and_icons(scene: Scene, entries: Sequence[Entry], fmi: int) -> bytes:
+def terminals_and_icons(scene: Scene, entries: Sequence[TableEntry], fmi: int) -> bytes:
     """Returns the text of terminalsAndIcons/terminalsAndIcons.xml.
 
     entries : the variable table
@@ -117,11 +135,13 @@ def terminals_and_icons(scene: Scene, entries: Sequence[Entry], fmi: int) -> byt
     return xml_text(root)
 
 
-def terminal_icons(scene: Scene, entries: Sequence[Entry]) -> dict[str, bytes]:
+def terminal_icons(scene: Scene, entries: Sequence[TableEntry]) -> dict[str, bytes]:
     """Returns the image files that terminalsAndIcons.xml names, by their place in the archive."""
     files = {}
     for kind in sorted({terminal.kind for terminal in terminals(scene, entries)}):
-        figure = Figure(TERMINAL_ICON_SIZE, TERMINAL_ICON_SIZE, kind.replace("_", " "), ICONS[kind])
+        figure = Figure(
+            TERMINAL_ICON_SIZE, TERMINAL_ICON_SIZE, kind.replace("_", " "), ICONS.get(kind, ICONS["torque"])
+        )
         files[f"terminalsAndIcons/{kind}.png"] = png(figure)
         files[f"terminalsAndIcons/{kind}.svg"] = svg(figure).encode()
     return files

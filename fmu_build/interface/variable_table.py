@@ -12,15 +12,8 @@ import casadi as ca
 
 from fmu_build.generate.vessel_loop import LONGEST_CODE
 from supervessel.equations import Equations
-from supervessel.scene.schema import Scene, keeps_momentum
-from supervessel.scene.variables import (
-    Variable,
-    derivative_variables,
-    input_variables,
-    output_variables,
-    parameter_variables,
-    state_variables,
-)
+from supervessel.scene.schema import keeps_momentum
+from supervessel.scene.variables import Variable
 
 Role = Literal["time", "input", "parameter", "output", "state", "derivative"]
 Kind = Literal["constant", "dependent"]
@@ -35,7 +28,7 @@ class Dependency:
 
 
 @dataclass(frozen=True)
-class Entry:
+class TableEntry:
     """A variable of the FMU.
 
     reference    : value reference, the variable's place in the table
@@ -56,15 +49,16 @@ Rows = dict[Role, list[tuple[Dependency, ...]]]
 TIME = Variable("time", "s", "simulation time")
 
 
-def variable_table(scene: Scene, model: Equations) -> tuple[Entry, ...]:
+def variable_table(model: Equations) -> tuple[TableEntry, ...]:
     """Returns the variables: time, inputs (p, then torque), start parameters, outputs, states, rates."""
+    resolved = model.resolved
     groups: dict[Role, Sequence[Variable]] = {
         "time": (TIME,),
-        "input": input_variables(scene),
-        "parameter": parameter_variables(scene),
-        "output": output_variables(scene),
-        "state": state_variables(scene),
-        "derivative": derivative_variables(scene),
+        "input": resolved.inputs,
+        "parameter": resolved.parameters,
+        "output": resolved.outputs,
+        "state": resolved.states,
+        "derivative": resolved.derivatives,
     }
     first: dict[Role, int] = {}
     count = 0
@@ -72,23 +66,21 @@ def variable_table(scene: Scene, model: Equations) -> tuple[Entry, ...]:
         first[role] = count
         count += len(variables)
     knowns = [*range(first["state"], first["state"] + 7)]
-    inputs = list(enumerate(input_variables(scene), start=first["input"]))
+    inputs = list(enumerate(resolved.inputs, start=first["input"]))
     knowns += [reference for reference, variable in inputs if variable.part != "contact"]
     booleans = frozenset(reference for reference, variable in inputs if variable.boolean)
-    by_role, at_start = _dependencies(scene, model, knowns, booleans)
+    by_role, at_start = _dependencies(model, knowns, booleans)
     entries = []
     for role, variables in groups.items():
         for i, variable in enumerate(variables):
             now = by_role[role][i] if role in by_role else ()
             start = at_start[role][i] if role in at_start else ()
             initial = _at_start(start, first["state"], first["parameter"])
-            entries.append(Entry(variable, first[role] + i, role, now, initial))
+            entries.append(TableEntry(variable, first[role] + i, role, now, initial))
     return tuple(entries)
 
 
-def _dependencies(
-    scene: Scene, model: Equations, knowns: Sequence[int], booleans: Set[int]
-) -> tuple[Rows, Rows]:
+def _dependencies(model: Equations, knowns: Sequence[int], booleans: Set[int]) -> tuple[Rows, Rows]:
     """Returns the dependencies of outputs and derivatives on states and inputs; and at the start those of
     states, too, on attitude and angular velocity, which stand for the states then, and on inputs.
 
@@ -106,18 +98,20 @@ def _dependencies(
     def rows(unknowns: Mapping[Role, ca.SX]) -> Rows:
         return {role: rows_of(unknown, known, knowns, booleans) for role, unknown in unknowns.items()}
 
-    follows = _after_change(scene, model, z, p, c)
+    follows = _after_change(model, z, p, c)
     now = rows(
         {"output": model.state_outputs(follows, u, c, a, 0.0), "derivative": model.state_ode(follows, u, c)}
     )
     if model.change is None:
         return now, now | rows({"state": z})
-    begun = ca.vertcat(z[:4], model.change.momentum_of(z[4:], c)) if keeps_momentum(scene) else z
+    begun = (
+        ca.vertcat(z[:4], model.change.momentum_of(z[4:], c)) if keeps_momentum(model.resolved.scene) else z
+    )
     rate = ca.vertcat(model.ode(z, u, c)[:4], model.state_ode(begun, u, c)[4:])
     return now, rows({"output": model.outputs(z, u, c, a, 0.0), "derivative": rate, "state": begun})
 
 
-def _after_change(scene: Scene, model: Equations, z: ca.SX, p: ca.SX, c: ca.SX) -> ca.SX:
+def _after_change(model: Equations, z: ca.SX, p: ca.SX, c: ca.SX) -> ca.SX:
     """Returns what stands for the states after a change of inputs: its structure tells what they follow from.
 
     A state that is the angular momentum is what a change of mass or pose keeps. An angular velocity jumps by
@@ -125,12 +119,11 @@ def _after_change(scene: Scene, model: Equations, z: ca.SX, p: ca.SX, c: ca.SX) 
     """
     if model.change is None:
         return z
-    rate = z[4:]
+    rate, scene = z[4:], model.resolved.scene
     if "momentum" in scene.keeps.values() and not keeps_momentum(scene):
         rate += model.change.keep_momentum(ca.SX.sym("kept", 3), ca.SX.sym("before", c.numel()), c)
-    flags = [
-        flag for name, flag in zip(model.p_names, ca.vertsplit(p), strict=True) if name.endswith(".docked")
-    ]
+    shaping = zip(model.resolved.shaping, ca.vertsplit(p), strict=True)
+    flags = [flag for variable, flag in shaping if variable.boolean]
     return ca.vertcat(z[:4], rate + sum(flags, ca.SX(0)))
 
 

@@ -1,6 +1,8 @@
 """What the command `supervessel cache` says of the cache, and how it clears it."""
 
+import argparse
 import re
+import sys
 from datetime import datetime
 from pathlib import Path
 
@@ -20,6 +22,17 @@ from fmu_build.storage.cache import (
 )
 from fmu_build.storage.temporary import is_own_folder
 from supervessel.problems import printable
+from supervessel.shell.console import print_results
+
+
+def cache(options: argparse.Namespace) -> int:
+    """Runs the command: shows the cache or clears it; returns its exit status."""
+    try:
+        said = clear() if options.clear else report()
+    except BuildError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return print_results(said, "the cache's content")
 
 
 def report() -> str:

@@ -21,8 +21,11 @@ from fmu_build.flight.choices import (
     models,
     reference_choices,
 )
-from fmu_build.flight.experiment import SLACK, Course, TradeError, course_of, experiment_of
-from fmu_build.flight.flight import BUILT_WITH, Flown, Workshop, builds, fly_all, workshop
+from fmu_build.flight.experiment import SLACK, Course, course_of, experiment_of
+from fmu_build.flight.flying import Flown, fly_all
+from fmu_build.flight.results import BUILT_WITH
+from fmu_build.flight.workshop import Workshop, builds, workshop
+from supervessel.problems import TradeError
 from supervessel.scene.schema import Scene, without_accuracy
 
 Array = NDArray[np.float64]

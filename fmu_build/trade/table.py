@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fmu_build.flight.choices import label
+from supervessel.rotation.propagators import PROPAGATORS
 
 ENOUGH = 1e-9
 """Integration error [rad] from which on a model's cheapest choice is quoted."""
@@ -137,7 +138,7 @@ def _brief(error: float, doubt: float = 0.0) -> str:
     return f"{error:.1e}" if error else "0"
 
 
-MARKERS = {"rk4": "o", "dop853": "s", "taylor": "D", "auto": "^", "split": "v", "exact": "P"}
+MARKERS = {name: row.marker for name, row in PROPAGATORS.items()} | {"auto": "^"}
 
 
 ERROR = "largest error of the attitude in {:g} s [rad]"

@@ -2,10 +2,10 @@
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from fmu_build.accuracy import AccuracyError, choose
     from supervessel import reference
+    from supervessel.fmu import choose
     from supervessel.loading import load_scene, parse_scene
-    from supervessel.problems import SceneError
+    from supervessel.problems import AccuracyError, SceneError
     from supervessel.scene.schema import Scene
     from supervessel.twin import Twin
 
@@ -13,11 +13,11 @@ __all__ = ["AccuracyError", "Scene", "SceneError", "Twin", "choose", "load_scene
 
 if not TYPE_CHECKING:
     _HOMES = {
-        "AccuracyError": "accuracy",
+        "AccuracyError": "problems",
         "Scene": "scene",
         "SceneError": "problems",
         "Twin": "twin",
-        "choose": "accuracy",
+        "choose": "fmu",
         "load_scene": "loading",
         "parse_scene": "loading",
         "reference": "reference",

@@ -6,24 +6,18 @@ supervessel cache [--clear]
 """
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import get_args
 
-from fmu_build.trade import TradeError, course_of, is_trade, plot, study, table
-from supervessel.loading import load_scene, parse_scene
+from supervessel import fmu
 from supervessel.orbiter import ScenarioError, import_scenario
-from supervessel.problems import SceneError, first, printable
-from supervessel.scene.schema import Convention, Scene, without_accuracy
-from supervessel.shell.console import Parser, print_results, show_progress
-from supervessel.shell.ending import say
-from supervessel.shell.files import OutputError, check_output, made_folder, write_file, write_files
-
-TRADE_FILES = ("json", "md", "png", "svg")
-"""Kinds of the files that a trade leaves, trade.KIND each; the first tells that they are a trade's."""
+from supervessel.problems import first
+from supervessel.scene.schema import Convention
+from supervessel.shell.console import Parser, print_results
+from supervessel.shell.files import OutputError, check_output, write_file
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -105,78 +99,10 @@ def _add_trade(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--duration", type=float, metavar="S", help="of the experiment [s] (default: the scene's)"
     )
-    parser.set_defaults(run=_trade)
-
-
-def _trade(options: argparse.Namespace) -> int:
-    # Package fmu_build is built on this one: looked up only here.
-    from fmu_build.errors import BuildError  # noqa: PLC0415
-
-    say("; what has been flown is kept, the same command goes on from there")
-    try:
-        scene = _lasting(without_accuracy(load_scene(options.scene)), options.duration)
-        folder: Path = options.output or Path(f"{scene.name}_trade")
-        course_of(scene)
-        with made_folder(folder):
-            _check_trade_files(folder, options.scene)
-            found = study(scene, quick=options.quick, progress=_progress)
-            tables = table(found)
-            files = {"json": json.dumps(found, indent=1).encode(), "md": f"{tables}\n".encode()}
-            try:
-                files |= plot(found)
-            except ImportError:
-                print(
-                    "no plot: matplotlib is not installed, pip install 'supervessel[plot]'", file=sys.stderr
-                )
-            write_files({folder / f"trade.{kind}": content for kind, content in files.items()})
-    except (SceneError, BuildError, OutputError) as error:
-        print(error, file=sys.stderr)
-        return 1
-    except TradeError as error:
-        print(f"{printable(options.scene.name)}: {error}", file=sys.stderr)
-        return 1
-    return print_results(f"{tables}\n\n{folder}", f"the trade is written to {folder}, its tables")
+    parser.set_defaults(run=fmu.trade)
 
 
 def _add_cache(parser: argparse.ArgumentParser) -> None:
     parser.description = "Show where compiled code and results are kept, how much, and whether that is used."
     parser.add_argument("--clear", action="store_true", help="remove it, nothing but supervessel-N")
-    parser.set_defaults(run=_cache)
-
-
-def _cache(options: argparse.Namespace) -> int:
-    from fmu_build.errors import BuildError  # noqa: PLC0415
-    from fmu_build.storage.report import clear, report  # noqa: PLC0415
-
-    try:
-        said = clear() if options.clear else report()
-    except BuildError as error:
-        print(error, file=sys.stderr)
-        return 1
-    return print_results(said, "the cache's content")
-
-
-def _check_trade_files(folder: Path, scene: Path) -> None:
-    """Raises OutputError, before any work is done, where a trade's files cannot be written.
-
-    Nor may they replace what is of no trade: files of their names without trade.json, or another's.
-    """
-    files = [folder / f"trade.{kind}" for kind in TRADE_FILES]
-    there = [file for file in files if check_output(file, [scene])]
-    if there and not is_trade(folder / "trade.json"):
-        raise OutputError(there[0], "is there already and is of no trade; remove it or take another folder")
-
-
-def _lasting(scene: Scene, duration: float | None) -> Scene:
-    """Returns the scene with an experiment of that duration [s]; None: the scene's own."""
-    if duration is None or scene.experiment is None:
-        return scene
-    raw = scene.model_dump(exclude_none=True)
-    raw["experiment"]["duration"] = duration
-    return parse_scene(raw, "--duration")
-
-
-def _progress(done: int, total: int, what: str) -> None:
-    """Shows how far a trade has come."""
-    bar = "#" * (24 * done // total)
-    show_progress(f"[{bar:.<24}] {done}/{total} {what}", "\n" if done == total else "")
+    parser.set_defaults(run=fmu.cache)

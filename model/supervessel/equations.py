@@ -19,26 +19,24 @@ from numpy.typing import NDArray
 
 from supervessel.composite.actions import (
     action_parts,
-    net_force,
     torque_about_barycentre,
-    vessel_outputs,
     vessel_parts,
-    vessels_shown,
 )
 from supervessel.composite.bodies import composite_body
 from supervessel.composite.inertia import Body, from_upper_triangle, ldl, ldl_inverse, upper_triangle
-from supervessel.rotation.attitude import attitude_dot, rotation_matrix, to_inertial, unit
+from supervessel.composite.resolved import ResolvedScene, resolve
+from supervessel.output_expressions import outputs_of
+from supervessel.rotation.attitude import attitude_dot, rotation_matrix
 from supervessel.rotation.changes import Change, change_functions, lookup_in
 from supervessel.rotation.laws import LAWS, principal_products
 from supervessel.rotation.principal import principal, principal_forward, quaternion
 from supervessel.rotation.propagators import PROPAGATORS, Plan, plan_of
 from supervessel.rotation.propagators.bound import fastest_square
 from supervessel.rotation.propagators.exact import free_functions, free_functions_of_start
-from supervessel.rotation.propagators.method import Motion
+from supervessel.rotation.propagators.method import StepSymbols
 from supervessel.scene.numbers import EPSILON
-from supervessel.scene.reuse import latest
+from supervessel.scene.reuse import reused
 from supervessel.scene.schema import Scene, changes_rate, keeps_momentum
-from supervessel.scene.variables import input_variables, output_names, state_variables
 from supervessel.shell.interrupts import interrupt_afterwards
 
 COMPOSITE_SIZES = {"mass": 1, "barycentre": 3, "inertia": 6, "pmi": 3, "margins": 3}
@@ -61,13 +59,11 @@ takes from it is divided by that row's own pivot d_2.
 """
 
 
-PRINCIPAL_OUTPUTS = frozenset({"principal_moments", "principal_axes"})
-
-
 @dataclass(frozen=True)
 class Equations:
     """Functions and names of one scene.
 
+    resolved     : the scene
     composite    : p -> c
     axes         : c -> a; "principal" of the composite for outputs, "free" of what the law turns freely:
                    three moments each, ascending, and axes: quaternion (4,) or matrix, column by column, (9,);
@@ -97,6 +93,7 @@ class Equations:
     slices         : where the parts of c stand
     """
 
+    resolved: ResolvedScene
     composite: ca.Function
     axes: ca.Function
     ode: ca.Function
@@ -181,15 +178,15 @@ def equations(scene: Scene) -> Equations:
 
     Raises ValueError for a scene whose law is still to be chosen.
     """
-    inputs = input_variables(scene)
+    resolved = resolve(scene)
     p_names, k_names, u_names = (
-        tuple(variable.name for variable in inputs if variable.part == part)
-        for part in ("shape", "contact", "action")
+        tuple(variable.name for variable in inputs)
+        for inputs in (resolved.shaping, resolved.contact, resolved.acting)
     )
     k, u, x, h = (ca.SX.sym(*s) for s in (("k", len(k_names)), ("u", len(u_names)), ("x", 7), ("h", 1)))
 
     law, plan = LAWS[scene.rotation.law], plan_of(scene)
-    p, of_p = _composite_of_inputs(scene)
+    p, of_p = _composite_of_inputs(resolved)
     where = _slices({name: part.numel() for name, part in of_p.items()})
     c_of_p = ca.densify(ca.vertcat(*of_p.values()))
     c = ca.SX.sym("c", c_of_p.numel())
@@ -201,7 +198,7 @@ def equations(scene: Scene) -> Equations:
 
     parts = parts_of(c)
     inertia = from_upper_triangle(parts["inertia"])
-    torque = torque_about_barycentre(scene, parts, u)
+    torque = torque_about_barycentre(resolved, parts, u)
     spin = parts["momentum"][:3] if "momentum" in parts and law.gyroscopic_term else None
 
     def rate(state: ca.SX) -> ca.SX:
@@ -210,10 +207,10 @@ def equations(scene: Scene) -> Equations:
         return ca.vertcat(attitude_dot(state[:4], state[4:]), acceleration)
 
     products = _without_zeros(law.gyroscopic(parts["law"]))
-    slices, a_of_c = _axes(scene, plan, inertia, products)
+    slices, a_of_c = _axes(resolved, plan, inertia, products)
     a, e = ca.SX.sym("a", a_of_c.numel()), ca.SX.sym("e")
     with_error = "error_estimate" in scene.outputs.names
-    motion = Motion(x, rate, law, parts["law"], torque, h, scene.rotation.tolerance, with_error)
+    motion = StepSymbols(x, rate, law, parts["law"], torque, h, scene.rotation.tolerance, with_error)
     rate_square, step, propagation, exponent = _steps(scene, plan, motion, parts, spin, u, c)
     if plan.free != "never":
         propagation += free_functions(a.numel(), slices["free"])
@@ -222,12 +219,12 @@ def equations(scene: Scene) -> Equations:
 
     def outputs_from(x: ca.SX) -> ca.SX:
         shown = a[slices["principal"]] if "principal" in slices else ca.SX.zeros(7)
-        return _outputs(scene, x, u, parts | {"principal": shown, "error_estimate": e})
+        return outputs_of(resolved, x, u, parts | {"principal": shown, "error_estimate": e})
 
     args, names = [x, u, c], ["x", "u", "c"]
     state_args, state_names = args, names
     y, z_rate = y_of_x, x_rate = outputs_from(x), rate(x)
-    change = change_functions(scene, c, parts_of, p, k) if changes_rate(scene) else None
+    change = change_functions(resolved, c, parts_of, p, k) if changes_rate(scene) else None
     by_momentum = change is not None and keeps_momentum(scene)
     if change is not None and by_momentum:
         z = ca.SX.sym("z", 7)
@@ -237,6 +234,7 @@ def equations(scene: Scene) -> Equations:
         turning = ca.cross(omega, z[4:]) if law.gyroscopic_term else ca.SX.zeros(3)
         z_rate = ca.vertcat(attitude_dot(z[:4], omega), torque - turning)
     return Equations(
+        resolved=resolved,
         composite=ca.Function("composite", [p], [c_of_p], ["p"], ["c"]),
         axes=ca.Function("axes", [c], [a_of_c], ["c"], ["a"]),
         ode=ca.Function("ode", args, [x_rate], names, ["x_dot"]),
@@ -258,15 +256,15 @@ def equations(scene: Scene) -> Equations:
         p_names=p_names,
         k_names=k_names,
         u_names=u_names,
-        x_names=tuple(variable.name for variable in state_variables(scene)),
-        y_names=output_names(scene),
+        x_names=tuple(variable.name for variable in resolved.states),
+        y_names=resolved.output_names,
     )
 
 
 def _steps(  # noqa: PLR0913, PLR0917
     scene: Scene,
     plan: Plan,
-    motion: Motion,
+    motion: StepSymbols,
     parts: Mapping[str, ca.SX],
     spin: ca.SX | None,
     u: ca.SX,
@@ -306,10 +304,12 @@ def _without_zeros(products: ca.SX) -> ca.SX:
     return ca.densify(ca.horzcat(*columns[:3]) if diagonal and columns else products)
 
 
-def _axes(scene: Scene, plan: Plan, inertia: ca.SX, products: ca.SX) -> tuple[dict[str, slice], ca.SX]:
+def _axes(
+    resolved: ResolvedScene, plan: Plan, inertia: ca.SX, products: ca.SX
+) -> tuple[dict[str, slice], ca.SX]:
     """Returns where the parts of a stand, and a as an expression of c; both empty where nobody needs them."""
-    rotation = scene.rotation
-    shown = not PRINCIPAL_OUTPUTS.isdisjoint(scene.outputs.names)
+    rotation = resolved.scene.rotation
+    shown = any(kind.axes for kind, _ in resolved.output_kinds)
     in_series = plan.method is not None and plan.method.control == "series"
     mapped = in_series and products.size2() > 3
     parts: dict[str, ca.SX] = {}
@@ -350,13 +350,10 @@ def p_start(scene: Scene) -> NDArray[np.float64]:
     where it points matters.
     """
     values = []
-    for variable in input_variables(scene):
-        if variable.part != "shape":
-            continue
-        owner, _, kind = variable.group.rpartition(".")
+    for variable in resolve(scene).shaping:
         start = variable.start
-        if kind in ("direction", "alignment"):
-            _, exponent = frexp(max(map(abs, getattr(scene.port(owner), kind))))
+        if variable.kind.directed:
+            _, exponent = frexp(max(map(abs, variable.kind.start(scene, variable.owner))))
             start = ldexp(start, -exponent) if abs(exponent) > LONGEST_EXPONENT else start
         values.append(start)
     return np.array(values)
@@ -366,20 +363,20 @@ def p_start(scene: Scene) -> NDArray[np.float64]:
 @simplification(True)
 def composite_at_start(scene: Scene) -> dict[str, NDArray[np.float64]]:
     """Returns the parts of c by name, (n,) each, for the scene's own values of the inputs."""
-    p, parts = _composite_of_inputs(scene)
+    p, parts = _composite_of_inputs(resolve(scene))
     c = ca.Function("composite", [p], [ca.vertcat(*parts.values())])
     values = np.array(c(p_start(scene))).ravel()
     return {name: values[where] for name, where in _slices({n: v.numel() for n, v in parts.items()}).items()}
 
 
-@latest
-def _composite_of_inputs(scene: Scene) -> tuple[ca.SX, dict[str, ca.SX]]:
+@reused
+def _composite_of_inputs(resolved: ResolvedScene) -> tuple[ca.SX, dict[str, ca.SX]]:
     """Returns p, and the parts of c as expressions of it: for the check of a scene and for its equations."""
-    p = ca.SX.sym("p", sum(variable.part == "shape" for variable in input_variables(scene)))
-    return p, composite_parts(scene, p)
+    p = ca.SX.sym("p", len(resolved.shaping))
+    return p, composite_parts(resolved, p)
 
 
-def composite_parts(scene: Scene, p: ca.SX) -> dict[str, ca.SX]:
+def composite_parts(resolved: ResolvedScene, p: ca.SX) -> dict[str, ca.SX]:
     """Returns the parts of c by name as expressions of p: those of COMPOSITE_SIZES, then
 
     law           : the law's own numbers
@@ -388,10 +385,10 @@ def composite_parts(scene: Scene, p: ca.SX) -> dict[str, ca.SX]:
     moment, force : see `vessels.action_parts`
     .NAME         : see `vessels.vessel_parts`
     """
-    lookup = lookup_in(scene, p, ("shape",))
-    body = composite_body(scene, lookup)
-    parts = body_parts(scene, body)
-    parts |= action_parts(scene, lookup, body.centre) | vessel_parts(scene, lookup, body)
+    lookup = lookup_in(resolved.shaping, p)
+    body = composite_body(resolved, lookup)
+    parts = body_parts(resolved.scene, body)
+    parts |= action_parts(resolved, lookup, body.centre) | vessel_parts(resolved, lookup, body)
     return {name: ca.densify(part) for name, part in parts.items()}
 
 
@@ -465,33 +462,3 @@ def _split(vector: ca.SX, like: list[ca.SX]) -> list[ca.SX]:
     """Returns a vector cut into parts of the sizes of `like`."""
     ends = np.cumsum([0] + [part.numel() for part in like])
     return [vector[int(start) : int(end)] for start, end in pairwise(ends)]
-
-
-def _outputs(scene: Scene, x: ca.SX, u: ca.SX, parts: dict[str, ca.SX]) -> ca.SX:
-    """Returns the scene's outputs, in its order.
-
-    parts : those of c, "principal" of a, and "error_estimate"
-    The attitude is brought to unit length once more: as a state it keeps it only to the accuracy of
-    whoever integrates it.
-    """
-    attitude, omega = unit(x[:4]), x[4:]
-    J = from_upper_triangle(parts["inertia"])
-    turned = J @ omega
-    momentum = turned + parts["momentum"][:3] if "momentum" in parts else turned
-    available = {
-        "mass": parts["mass"],
-        "barycentre": parts["barycentre"],
-        "pmi": parts["pmi"],
-        "inertia": ca.vec(J),
-        "angular_velocity": omega,
-        "attitude": attitude,
-        "kinetic_energy": 0.5 * ca.dot(omega, turned),
-        "angular_momentum": to_inertial(attitude, momentum),
-        "principal_moments": parts["principal"][:3],
-        "principal_axes": parts["principal"][3:],
-        "error_estimate": parts["error_estimate"],
-        "net_force": net_force(scene, parts, u),
-    }
-    for name in vessels_shown(scene):
-        available |= vessel_outputs(name, parts[f".{name}"], attitude, omega)
-    return ca.densify(ca.vertcat(*(available[name] for name in scene.outputs.names)))

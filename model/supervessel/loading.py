@@ -8,12 +8,13 @@ import numpy as np
 from pydantic import ValidationError
 
 from supervessel.composite.docks import TooManyWaysError
+from supervessel.composite.resolved import resolve
 from supervessel.equations import composite_at_start
 from supervessel.problems import SceneError, few_suggestions, key_path, quantity, unknown
 from supervessel.scene.consistency import consistency_problems
 from supervessel.scene.names import misnamed_courses, naming_problems, size_problems
 from supervessel.scene.schema import Scene, known_keys
-from supervessel.scene.variables import InputVariable, input_variables
+from supervessel.scene.variables import InputVariable
 from supervessel.shell.reading import ReadingError, read_toml
 
 EXPECTED = {
@@ -101,7 +102,7 @@ def _range_problems(scene: Scene) -> list[str]:
     """Returns which start values lie outside inputs.range."""
     problems = []
     groups: dict[str, list[InputVariable]] = {}
-    for variable in input_variables(scene):
+    for variable in resolve(scene).inputs:
         for name in {variable.name, variable.group}:
             groups.setdefault(name, []).append(variable)
     for name, (low, high) in scene.inputs.range.items():
@@ -116,13 +117,13 @@ def _range_problems(scene: Scene) -> list[str]:
 def _course_problems(scene: Scene) -> list[str]:
     """Returns which values of experiment.inputs an input cannot have."""
     problems = []
-    variables = {variable.name: variable for variable in input_variables(scene)}
+    variables = {variable.name: variable for variable in resolve(scene).inputs}
     for name, rows in scene.experiment.inputs.items() if scene.experiment else ():
-        variable, kind = variables[name], name.rpartition(".")[2].partition("[")[0]
+        variable = variables[name]
         low, high, boolean = variable.low, variable.high, variable.boolean
         allowed = f"outside inputs.range = {quantity((low, high), variable.unit)}"
         if low is None or high is None:
-            allowed = f"a {'mass' if kind == 'mass' else 'moment'} must be >= 0 {variable.unit}"
+            allowed = f"{variable.kind.noun} must be >= {variable.low or 0.0:g} {variable.unit}"
         for time, value in rows:
             outside = (low is not None and value < low) or (high is not None and value > high)
             if boolean is not isinstance(value, bool):

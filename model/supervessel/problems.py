@@ -57,6 +57,17 @@ class SceneError(ValueError):
         super().__init__("\n".join(f"{printable(source)}: {problem}" for problem in first(self.problems)))
 
 
+class TradeError(RuntimeError):
+    """A trade that cannot be made; the message says why, in lines that can be shown."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(shown_message(message))
+
+
+class AccuracyError(TradeError):
+    """An accuracy that cannot be had; the message says what can."""
+
+
 def printable(text: str, longest: int = LONGEST_WORD) -> str:
     r"""Returns a text as it can be shown in a line, of at most `longest` characters.
 

@@ -19,7 +19,7 @@ from scipy.integrate import solve_ivp
 from fmu_build import BuildError, build_fmu
 from fmu_build.trade.study import attitude_apart
 from supervessel import Scene, parse_scene, reference
-from supervessel.scene.variables import input_variables
+from supervessel.composite.resolved import resolve
 
 RTOL, ATOL = 1e-13, 1e-15
 HELD = 25
@@ -141,7 +141,7 @@ class _Wanderer:
     """Inputs step by step, by a rule of their own, within their ranges."""
 
     def __init__(self, scene: Scene, kind: str, draw: np.random.Generator, steps: int) -> None:
-        variables = input_variables(scene)
+        variables = resolve(scene).inputs
         self.kind, self.draw, self.steps = kind, draw, steps
         self.start = {v.name: v.start for v in variables}
         self.names = [v.name for v in variables]

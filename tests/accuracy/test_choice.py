@@ -14,7 +14,9 @@ from fmu_build.__main__ import main
 from fmu_build.accuracy.histories import course_up_to, histories
 from fmu_build.flight.choices import BEST, Choice
 from fmu_build.flight.experiment import course_of
-from fmu_build.flight.flight import Inputs, build_all, keep, read, run_host, source_of, workshop
+from fmu_build.flight.flying import InputCourses, run_host
+from fmu_build.flight.results import keep, read
+from fmu_build.flight.workshop import build_all, source_of, workshop
 from supervessel import AccuracyError, Twin, choose, parse_scene
 from supervessel.equations import equations
 from supervessel.scene.schema import without_accuracy
@@ -204,7 +206,7 @@ def test_libraries_for_trials_fly_the_same_to_the_last_bit():
     scene = parse_scene(variant(DOCKED, {"accuracy": None, "experiment": experiment}))
     course = course_of(scene)
     columns = np.column_stack([course.numbers[name] for name in inputs])
-    flown_with = Inputs(np.arange(course.steps), columns, np.zeros((course.steps, 0)))
+    flown_with = InputCourses(np.arange(course.steps), columns, np.zeros((course.steps, 0)))
     counts = []
     for name in ("taylor", "dop853", "auto", "split"):
         choice = Choice(BEST, name, None, 1e-10)

@@ -17,8 +17,9 @@ import casadi as ca
 from fmpy import extract, read_model_description
 from run import build_host
 
-from fmu_build.build import build_fmu, generate
+from fmu_build.build import build_fmu
 from fmu_build.compile.compiler import FLAGS, compile_library
+from fmu_build.generate.model import generate
 from fmu_build.generate.sources import source_files
 from fmu_build.platforms import host_platform
 from supervessel import Scene, parse_scene

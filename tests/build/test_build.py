@@ -14,8 +14,9 @@ import pytest
 
 import fmu_build
 from fmu_build import BuildError, build_fmu
-from fmu_build.build import compile_sources, generate
 from fmu_build.compile.compiler import compile_library, fmi_headers
+from fmu_build.compile.library import compile_sources
+from fmu_build.generate.model import generate
 from fmu_build.generate.sources import source_file_names, source_files
 from fmu_build.platforms import PLATFORMS, host_platform
 from supervessel import load_scene

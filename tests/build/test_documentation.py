@@ -57,7 +57,7 @@ SCENES = {
 def made(name, fmi=3):
     """Returns a scene of SCENES, its variable table and its files."""
     scene = parse_scene(SCENES[name])
-    entries = variable_table(scene, equations(scene))
+    entries = variable_table(equations(scene))
     return scene, entries, documentation(scene, entries, fmi)
 
 
@@ -158,7 +158,7 @@ def test_the_page_lists_vessels_and_ports():
 @pytest.mark.parametrize("law", get_args(Law))
 def test_the_page_gives_the_equation_of_each_law(law):
     scene = parse_scene(body(law=law))
-    html = documentation(scene, variable_table(scene, equations(scene)), 3)[INDEX].decode()
+    html = documentation(scene, variable_table(equations(scene)), 3)[INDEX].decode()
     assert f"Rotation: law {law}" in html
     assert ("positive definite" in html) == (law != "none")
 
@@ -166,7 +166,7 @@ def test_the_page_gives_the_equation_of_each_law(law):
 @pytest.mark.parametrize("propagator", PROPAGATOR_NAMES)
 def test_the_page_describes_each_propagator(propagator):
     scene = parse_scene(body(propagator=propagator))
-    html = documentation(scene, variable_table(scene, equations(scene)), 3)[INDEX].decode()
+    html = documentation(scene, variable_table(equations(scene)), 3)[INDEX].decode()
     assert f"propagator {propagator}" in html
 
 
@@ -257,7 +257,7 @@ def test_terminals_of_one_model_do_not_cover_each_other():
         f"v{name}": {"mass": 1.0, "pmi": [1.0, 1.0, 1.0], "ports": {"p": other}} for name in ports
     }
     scene = parse_scene(raw)
-    root = etree.fromstring(terminals_and_icons(scene, variable_table(scene, equations(scene)), 3))
+    root = etree.fromstring(terminals_and_icons(scene, variable_table(equations(scene)), 3))
     spans = sorted(
         (float(graphic.get("y1")), float(graphic.get("y2")))
         for graphic in root.iter("TerminalGraphicalRepresentation")

@@ -9,8 +9,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from fmu_build.build import generate
 from fmu_build.compile.compiler import FLAGS, compile_library
+from fmu_build.generate.model import generate
 from fmu_build.generate.sources import source_files
 from fmu_build.generate.vessel_loop import LANES, LONGEST_CODE, loop_tables
 from fmu_build.platforms import host_platform
@@ -92,7 +92,7 @@ def both(request) -> tuple[Compiled, Equations, np.ndarray]:
     """The loop, the straight code, and values of the inputs that are off the scene's."""
     scene = parse_scene(SCENES[request.param])
     model = equations(scene)
-    assert loop_tables(scene, model) is not None
+    assert loop_tables(model) is not None
     start = p_start(scene)
     generator = np.random.default_rng(1)
     p = start * generator.uniform(0.9, 1.1, len(start)) + generator.uniform(-0.1, 0.1, len(start))
@@ -152,7 +152,7 @@ def _largest_terms(model: Equations, p: np.ndarray, dp: np.ndarray) -> np.ndarra
 def test_a_short_composite_is_straight_code():
     model = equations(scene(ISS_DG))
     assert model.composite.n_instructions() <= LONGEST_CODE
-    assert loop_tables(scene(ISS_DG), model) is None
+    assert loop_tables(model) is None
 
 
 @pytest.mark.parametrize(
@@ -166,7 +166,7 @@ def test_a_short_composite_is_straight_code():
 )
 def test_what_a_loop_does_not_know_is_straight_code(more):
     scene = parse_scene(variant(everything(), more))
-    assert loop_tables(scene, equations(scene)) is None
+    assert loop_tables(equations(scene)) is None
 
 
 def test_an_fmu_with_a_loop_flies_as_the_twin_does():

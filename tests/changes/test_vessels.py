@@ -9,7 +9,7 @@ from hypothesis import Phase, given, settings
 
 from changes.histories import Values, assembly, elements, happening, start_values
 from supervessel import Scene, Twin, reference
-from supervessel.scene.schema import VESSEL_OUTPUT_NAMES
+from supervessel.scene.outputs import VESSEL_OUTPUTS
 from support import EPS, flying, scene, variant
 
 AGREEMENT = 1000 * EPS
@@ -20,7 +20,7 @@ roundings, and a vessel's place is off by that of the others' lengths."""
 def shown(seed: int, count: int, **rotation: Any) -> dict[str, Any]:
     """Returns a random assembly with outputs of every vessel, the forces' sum and the whole momentum."""
     raw = assembly(seed, count, **rotation)
-    names = [f"{vessel}.{name}" for vessel in raw["vessels"] for name in VESSEL_OUTPUT_NAMES]
+    names = [f"{vessel}.{name}" for vessel in raw["vessels"] for name in VESSEL_OUTPUTS]
     return variant(raw, {"outputs": {"names": [*names, "net_force", "angular_momentum"]}})
 
 
@@ -59,7 +59,7 @@ def test_outputs_of_vessels_are_the_references(seed, count):
     flown = scene(shown(seed, count))
     values, x = moved(flown, seed), state(seed)
     found, truth = twins_outputs(flown, x, values), reference.vessel_outputs(flown, x, values)
-    for kind in VESSEL_OUTPUT_NAMES:
+    for kind in VESSEL_OUTPUTS:
         largest = max(np.abs(truth[f"{vessel}.{kind}"]).max() for vessel in flown.vessels)
         for vessel in flown.vessels:
             value, right = found[f"{vessel}.{kind}"], truth[f"{vessel}.{kind}"]

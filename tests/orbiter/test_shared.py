@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fmu_build import build_fmu
-from fmu_build.build import generate
+from fmu_build.generate.model import generate
 from orbiter.points import scene_pmi
 from supervessel import Twin, parse_scene, reference
 from supervessel.orbiter import import_scenario

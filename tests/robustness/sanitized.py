@@ -25,7 +25,7 @@ def compile_binaries(  # noqa: PLR0917
     model_identifier: str,
     flags: Sequence[str] = (),
 ) -> dict[str, bytes]:
-    """Returns the library by archive path, as `fmu_build.compile.compiler.compile_binaries` does for this machine.
+    """Returns the library by archive path, as `compile_binaries` does for this machine.
 
     flags : of the other compiler, for naught
     """

@@ -18,8 +18,9 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackL
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 
 from fmu_build import build_fmu
-from fmu_build.build import compile_sources, generate
 from fmu_build.compile.compiler import FLAGS, TRIAL_FLAGS
+from fmu_build.compile.library import compile_sources
+from fmu_build.generate.model import generate
 from fmu_build.generate.sources import source_file_names, source_files
 from fmu_build.platforms import host_platform
 from supervessel import Scene, parse_scene

@@ -6,7 +6,8 @@ from typing import Any
 
 import casadi as ca
 
-from fmu_build.build import compile_sources, generate
+from fmu_build.compile.library import compile_sources
+from fmu_build.generate.model import generate
 from fmu_build.generate.sources import source_file_names, source_files
 from fmu_build.platforms import PLATFORMS
 from supervessel import Scene

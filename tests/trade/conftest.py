@@ -2,7 +2,7 @@
 
 import pytest
 
-from fmu_build.flight.flight import workshop
+from fmu_build.flight.workshop import workshop
 from support.processes import cache
 
 __all__ = ["cache"]

@@ -9,7 +9,9 @@ import pytest
 from fmu_build.compile.compiler import FLAGS, compile_library
 from fmu_build.flight.choices import BEST, Choice, Model, models, reference_choices, variant_of
 from fmu_build.flight.experiment import course_of
-from fmu_build.flight.flight import HERE, fly_all, keep, place_of, read
+from fmu_build.flight.flying import fly_all
+from fmu_build.flight.results import keep, place_of, read
+from fmu_build.flight.workshop import HERE
 from fmu_build.platforms import host_platform
 from supervessel import parse_scene
 from support import ISS_DG, OK, Instance, variant

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from fmu_build.flight.choices import BEST, Choice, label
 from fmu_build.flight.experiment import course_of
-from fmu_build.flight.flight import fly_all
+from fmu_build.flight.flying import fly_all
 from fmu_build.trade import TradeError, plot, study, table
 from supervessel import parse_scene, reference
 from support import variant

@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-import supervessel
 from changes.test_docking import MIR
 from fmu_build import BuildError
-from fmu_build.build import generate
+from fmu_build.generate.model import generate
 from fmu_build.generate.sources import LAYER
 from supervessel import Twin
 from supervessel.twin.functions import TwinFunction
@@ -25,7 +24,7 @@ Array = NDArray[np.float64]
 
 STARTS = 12  # of flights of each scene
 ANGLES = [0.01, 3.0, 40.0]  # rad, about what the body turns by in a communication step
-WRAPPER = Path(supervessel.__file__).parent / "control" / "communication_step.c"
+WRAPPER = LAYER.parent / "compile" / "communication_step.c"
 ATTITUDE_IS_TAKEN_AS_IT_IS = 4 * EPS  # departure of its square from 1, see instance_start_attitude
 
 

@@ -1,17 +1,58 @@
 """What single vessels do in the whole, in CasADi symbols: where forces act, and outputs of a vessel."""
 
-from collections.abc import Set
+from collections.abc import Callable, Mapping, Set
+from dataclasses import dataclass
 
 import casadi as ca
 
 from supervessel.composite.bodies import Lookup, placed_groups, vessel_body
 from supervessel.composite.inertia import Body, from_upper_triangle, offset_tensor, upper_triangle
 from supervessel.composite.poses import Pose, constant
+from supervessel.composite.resolved import ResolvedScene
 from supervessel.rotation.attitude import quaternion, to_inertial
+from supervessel.scene.inputs import FORCE, vessel_of
 from supervessel.scene.schema import Scene
+from supervessel.scene.variables import InputVariable
+
+Placed = Mapping[str, tuple[Pose, ca.SX | None]]
+"""Poses of vessels in the root's axes, and whether they hang on the root (None: always)."""
 
 
-def action_parts(scene: Scene, lookup: Lookup, centre: ca.SX) -> dict[str, ca.SX]:
+@dataclass(frozen=True)
+class Acting:
+    """What an input that acts on a vessel makes of its three components, body axes.
+
+    moment : (3, 3), torque about the barycentre
+    force  : (3, 3), force; None: none
+    """
+
+    moment: ca.SX
+    force: ca.SX | None = None
+
+
+def _at_point(scene: Scene, name: str, where: Placed, centre: ca.SX) -> Acting:
+    """Returns what a force at a point, "vessel.point", does."""
+    pose, attached = where[vessel_of(name)]
+    arm = pose.origin + pose.rotation @ constant(scene.point(name).position) - centre
+    turned = pose.rotation if attached is None else attached * pose.rotation
+    return Acting(ca.skew(arm) @ turned, turned)
+
+
+def _on_vessel(scene: Scene, name: str, where: Placed, centre: ca.SX) -> Acting:
+    """Returns what a torque on a vessel, in its axes, does."""
+    pose, attached = where[name]
+    return Acting(pose.rotation if attached is None else attached * pose.rotation)
+
+
+ACTIONS: dict[str, Callable[[Scene, str, Placed, ca.SX], Acting]] = {
+    "force": _at_point,
+    "vessel_torque": _on_vessel,
+}
+"""How inputs act, by their key: scene, owner, poses, barycentre -> what each does. A kind that is not here
+is a torque about the barycentre in body axes as it stands."""
+
+
+def action_parts(resolved: ResolvedScene, lookup: Lookup, centre: ca.SX) -> dict[str, ca.SX]:
     """Returns the parts of c by which forces and torques on vessels act.
 
     centre : barycentre, (3,) [m], root axes
@@ -20,57 +61,46 @@ def action_parts(scene: Scene, lookup: Lookup, centre: ca.SX) -> dict[str, ca.SX
                vessel: what each makes of its three components as torque about the barycentre, body axes
     "force"  : (9 m,), likewise for each force its components in body axes
     """
-    inputs = scene.inputs
-    if not (inputs.force or inputs.vessel_torque):
+    acting = [variable for _, variable in _acting(resolved) if variable.kind.key in ACTIONS]
+    if not acting:
         return {}
-    where = _placed(
-        scene, lookup, {*(name.partition(".")[0] for name in inputs.force), *inputs.vessel_torque}
-    )
-    moments, forces = [], []
-    for name in inputs.force:
-        pose, attached = where[name.partition(".")[0]]
-        arm = pose.origin + pose.rotation @ constant(scene.point(name).position) - centre
-        turned = pose.rotation if attached is None else attached * pose.rotation
-        moments.append(ca.skew(arm) @ turned)
-        forces.append(turned)
-    for name in inputs.vessel_torque:
-        pose, attached = where[name]
-        moments.append(pose.rotation if attached is None else attached * pose.rotation)
-    parts = {"moment": ca.vertcat(*map(ca.vec, moments))}
-    if "net_force" in scene.outputs.names and forces:
-        parts["force"] = ca.vertcat(*map(ca.vec, forces))
+    where = _placed(resolved, lookup, {vessel_of(variable.owner) for variable in acting})
+    found = [ACTIONS[v.kind.key](resolved.scene, v.owner, where, centre) for v in acting]
+    parts = {"moment": ca.vertcat(*(ca.vec(one.moment) for one in found))}
+    forces = [ca.vec(one.force) for one in found if one.force is not None]
+    if "net_force" in resolved.scene.outputs.names and forces:
+        parts["force"] = ca.vertcat(*forces)
     return parts
 
 
-def torque_about_barycentre(scene: Scene, parts: dict[str, ca.SX], u: ca.SX) -> ca.SX:
-    """Returns the torque of everything that acts, (3,) [N m], body axes.
-
-    u : the inputs that act: torque if there is one, forces, torques on vessels
-    """
-    first = 3 if scene.inputs.torque else 0
-    total = u[:3] if first else ca.SX.zeros(3)
-    return _sum(total, parts.get("moment"), u[first:])
+def _acting(resolved: ResolvedScene) -> list[tuple[int, InputVariable]]:
+    """Returns place in u and first variable of each input that acts."""
+    return [(place, variable) for place, variable in enumerate(resolved.acting) if variable.element == 0]
 
 
-def net_force(scene: Scene, parts: dict[str, ca.SX], u: ca.SX) -> ca.SX:
-    """Returns the sum of the forces, (3,) [N], body axes."""
-    first = 3 if scene.inputs.torque else 0
-    return _sum(ca.SX.zeros(3), parts.get("force"), u[first:])
-
-
-def _sum(total: ca.SX, matrices: ca.SX | None, vectors: ca.SX) -> ca.SX:
-    """Returns the total and the products of matrices, (9 n,), with as many vectors, (3 n,) or more."""
-    if matrices is None:
-        return total
-    for i in range(matrices.numel() // 9):
-        total = total + ca.reshape(matrices[9 * i : 9 * i + 9], 3, 3) @ vectors[3 * i : 3 * i + 3]
+def torque_about_barycentre(resolved: ResolvedScene, parts: Mapping[str, ca.SX], u: ca.SX) -> ca.SX:
+    """Returns the torque of everything that acts, (3,) [N m], body axes; u : the inputs that act."""
+    total, taken = ca.SX.zeros(3), 0
+    for place, variable in _acting(resolved):
+        own = u[place : place + 3]
+        if variable.kind.key in ACTIONS:
+            own = _matrix(parts["moment"], taken) @ own
+            taken += 1
+        total = total + own
     return total
 
 
-def vessels_shown(scene: Scene) -> list[str]:
-    """Returns the vessels that outputs are about, in the scene's order."""
-    shown = {name.partition(".")[0] for name in scene.outputs.names if "." in name}
-    return [vessel for vessel in scene.vessels if vessel in shown]
+def net_force(resolved: ResolvedScene, parts: Mapping[str, ca.SX], u: ca.SX) -> ca.SX:
+    """Returns the sum of the forces, (3,) [N], body axes."""
+    total = ca.SX.zeros(3)
+    places = [place for place, variable in _acting(resolved) if variable.kind is FORCE]
+    for number, place in enumerate(places):
+        total = total + _matrix(parts["force"], number) @ u[place : place + 3]
+    return total
+
+
+def _matrix(numbers: ca.SX, number: int) -> ca.SX:
+    return ca.reshape(numbers[9 * number : 9 * number + 9], 3, 3)
 
 
 SIZES = {"docked": 1, "origin": 3, "centre": 3, "rotation": 9, "rate": 3, "inertia": 6, "spin": 3}
@@ -82,18 +112,18 @@ of its motion relative to the body axes.
 """
 
 
-def vessel_parts(scene: Scene, lookup: Lookup, whole: Body) -> dict[str, ca.SX]:
+def vessel_parts(resolved: ResolvedScene, lookup: Lookup, whole: Body) -> dict[str, ca.SX]:
     """Returns the part of c, (28,), named after each vessel that outputs are about, with a dot before it.
 
     whole : all of it as one body
     """
-    if not vessels_shown(scene):
+    if not resolved.vessels_shown:
         return {}
-    where = _placed(scene, lookup, set(vessels_shown(scene)))
+    where = _placed(resolved, lookup, set(resolved.vessels_shown))
     parts = {}
-    for name in vessels_shown(scene):
+    for name in resolved.vessels_shown:
         pose, attached = where[name]
-        body = vessel_body(scene, name, lookup, Pose(ca.SX.eye(3), ca.SX.zeros(3)))
+        body = vessel_body(resolved.scene, name, lookup, Pose(ca.SX.eye(3), ca.SX.zeros(3)))
         seen = body.seen_from(pose.rotation, pose.origin, pose.velocity, pose.rate)
         rho = seen.centre - whole.centre
         inertia = seen.inertia + seen.mass * offset_tensor(rho)
@@ -143,11 +173,11 @@ def vessel_outputs(name: str, part: ca.SX, attitude: ca.SX, omega: ca.SX) -> dic
     }
 
 
-def _placed(scene: Scene, lookup: Lookup, names: Set[str]) -> dict[str, tuple[Pose, ca.SX | None]]:
+def _placed(resolved: ResolvedScene, lookup: Lookup, names: Set[str]) -> dict[str, tuple[Pose, ca.SX | None]]:
     """Returns some vessels' poses in the root's axes, and whether they hang on the root (None: always)."""
     return {
         name: (group.pose_of(name), group.attached)
-        for group in placed_groups(scene, lookup)
+        for group in placed_groups(resolved, lookup)
         for name in group.inside
         if name in names
     }

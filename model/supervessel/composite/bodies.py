@@ -8,10 +8,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from supervessel.composite.constants import Places, constant_and_varying, lump, places
-from supervessel.composite.docks import Joint, Way, groups, ways
+from supervessel.composite.constants import Places
+from supervessel.composite.docks import Joint, Way
 from supervessel.composite.inertia import Body, combine, orbiter_moments, placed_body, symmetric
 from supervessel.composite.poses import Pose, constant, mated_pose, port_axes, scaled
+from supervessel.composite.resolved import ResolvedScene, RigidGroup
 from supervessel.scene.schema import Scene
 
 Lookup = Callable[[str, ArrayLike], ca.SX]
@@ -36,7 +37,7 @@ class PlacedGroup:
         return self.pose.then(self.inside[vessel])
 
 
-def composite_body(scene: Scene, lookup: Lookup) -> Body:
+def composite_body(resolved: ResolvedScene, lookup: Lookup) -> Body:
     """Returns what hangs on the root as one body in the root vessel's axes.
 
     Vessels that no pose input and no dock input separates form a rigid group. Those of constant mass are
@@ -44,15 +45,17 @@ def composite_body(scene: Scene, lookup: Lookup) -> Body:
     placed by the pose that moves it; the others are placed one by one.
     """
     bodies = []
-    for number, group in enumerate(placed_groups(scene, lookup)):
-        lumped = _lumped(scene, group.inside, lookup)
+    for number, (group, placed) in enumerate(
+        zip(resolved.groups, placed_groups(resolved, lookup), strict=True)
+    ):
+        lumped = _lumped(resolved.scene, group, lookup)
         if number > 0:
-            pose = group.pose
+            pose = placed.pose
             lumped = [b.seen_from(pose.rotation, pose.origin, pose.velocity, pose.rate) for b in lumped]
-        if group.attached is not None:
-            lumped = [body.times(group.attached) for body in lumped]
+        if placed.attached is not None:
+            lumped = [body.times(placed.attached) for body in lumped]
         bodies += lumped
-    return by_convention(scene, combine(bodies))
+    return by_convention(resolved.scene, combine(bodies))
 
 
 def by_convention(scene: Scene, whole: Body) -> Body:
@@ -63,41 +66,36 @@ def by_convention(scene: Scene, whole: Body) -> Body:
     return whole
 
 
-def placed_groups(scene: Scene, lookup: Lookup) -> list[PlacedGroup]:
+def placed_groups(resolved: ResolvedScene, lookup: Lookup) -> list[PlacedGroup]:
     """Returns the rigid groups of a scene, the root's own first."""
-    parts = groups(scene)
-    inside = places(scene, parts)
-    pose_by = _placing(scene, lookup, inside)
+    pose_by = _placing(resolved, lookup)
     placed = []
-    for number, alternatives in enumerate(ways(scene, parts)):
-        poses = [pose_by(way) for way in alternatives]
-        attached = [_all_true(way, lookup) for way in alternatives]
+    for group in resolved.groups:
+        poses = [pose_by(way) for way in group.ways]
+        attached = [_all_true(way, lookup) for way in group.ways]
         holding = [i for i, flag in enumerate(attached) if flag is None]
-        if len(alternatives) == 1 or holding:  # no other way can hold beside one that always does
+        if len(group.ways) == 1 or holding:  # no other way can hold beside one that always does
             always = holding[0] if holding else 0
-            placed.append(PlacedGroup(poses[always], attached[always], inside[number]))
+            placed.append(PlacedGroup(poses[always], attached[always], group.inside))
         else:
             flags = [flag for flag in attached if flag is not None]
             holds, pose = _chosen(flags, poses)
-            placed.append(PlacedGroup(pose, holds, inside[number]))
+            placed.append(PlacedGroup(pose, holds, group.inside))
     return placed
 
 
-def _placing(scene: Scene, lookup: Lookup, inside: Sequence[Places]) -> Callable[[Way], Pose]:
-    """Returns the function that gives a group's pose by one way.
-
-    inside : poses of the vessels of each group in its axes
-    """
-    home = {vessel: poses for poses in inside for vessel in poses}
+def _placing(resolved: ResolvedScene, lookup: Lookup) -> Callable[[Way], Pose]:
+    """Returns the function that gives a group's pose by one way."""
+    scene, home = resolved.scene, resolved.home
 
     @cache
     def pose_by(way: Way) -> Pose:
         if way.joint is None or way.before is None:
-            return inside[0][scene.root]
-        joint = way.joint
-        step = home[joint.parent][joint.parent].then(_joint_pose(scene, joint, lookup))
-        own = inside[way.group][joint.child]
-        is_reference = next(iter(inside[way.group])) == joint.child
+            return resolved.groups[0].inside[scene.root]
+        joint, group = way.joint, resolved.groups[way.group]
+        step = home[joint.parent].inside[joint.parent].then(_joint_pose(scene, joint, lookup))
+        own = group.inside[joint.child]
+        is_reference = group.reference == joint.child
         return pose_by(way.before).then(step if is_reference else step.then(own.inverse()))
 
     return pose_by
@@ -133,13 +131,12 @@ def _chosen(flags: Sequence[ca.SX], poses: Sequence[Pose]) -> tuple[ca.SX, Pose]
     return attached, Pose(rotation, origin, pick(velocities), pick(rates))
 
 
-def _lumped(scene: Scene, inside: Places, lookup: Lookup) -> list[Body]:
+def _lumped(scene: Scene, group: RigidGroup, lookup: Lookup) -> list[Body]:
     """Returns the vessels of a group in its axes: those that are constant as one body, before the others."""
-    constants, varying = constant_and_varying(scene, inside)
-    bodies = [vessel_body(scene, name, lookup, inside[name]) for name in varying]
-    if not constants:
+    bodies = [vessel_body(scene, name, lookup, group.inside[name]) for name in group.varying]
+    if group.fixed is None:
         return bodies
-    mass, centre, inertia = lump(scene, {name: inside[name] for name in constants})
+    mass, centre, inertia = group.fixed
     return [Body(constant(mass), constant(centre), constant(inertia)), *bodies]
 
 

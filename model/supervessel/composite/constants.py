@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from supervessel.composite.docks import Group, Joint
+from supervessel.composite.docks import Joint, VesselGroup
 from supervessel.composite.inertia import combine_numbers, orbiter_moments, placed_body
 from supervessel.composite.poses import Pose, constant, mated_pose, port_axes, scaled
 from supervessel.scene.schema import Scene, Vessel
@@ -21,7 +21,7 @@ Places = Mapping[str, Pose]
 """Poses of vessels, constants, in the axes of their group."""
 
 
-def places(scene: Scene, parts: Sequence[Group]) -> list[Places]:
+def places(scene: Scene, parts: Sequence[VesselGroup]) -> list[Places]:
     """Returns where the vessels of each rigid group stand."""
     steps = iter(_mated_poses(scene, [joint for part in parts for joint in part.joints]))
     found: list[Places] = []

@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from supervessel.scene.inputs import part_of
 from supervessel.scene.schema import Dock, Scene
 
 MOST_WAYS = 64
@@ -39,7 +40,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Group:
+class VesselGroup:
     """Vessels that are held together by docks always closed, none of whose ports has a pose input.
 
     reference : the vessel in whose axes the group is put together
@@ -89,21 +90,21 @@ def joints(scene: Scene) -> Iterator[Joint]:
     return _spread(scene.root, _neighbours(scene, [dock for dock in scene.docks if dock.docked]))
 
 
-def groups(scene: Scene) -> tuple[Group, ...]:
+def groups(scene: Scene) -> tuple[VesselGroup, ...]:
     """Returns the rigid groups, the root's own first, in the order in which they hang on it."""
     moving = set(scene.inputs.pose)
     rigid = [d for d in scene.docks if not switchable(scene, d) and not moving.intersection(d.ports)]
     rigidly, somehow = _neighbours(scene, rigid), _neighbours(scene, scene.docks)
-    found: list[Group] = []
+    found: list[VesselGroup] = []
     taken: set[str] = set()
     for vessel in (scene.root, *(joint.child for joint in _spread(scene.root, somehow))):
         if vessel not in taken:
-            found.append(Group(vessel, tuple(_spread(vessel, rigidly))))
+            found.append(VesselGroup(vessel, tuple(_spread(vessel, rigidly))))
             taken.update(found[-1].vessels)
     return tuple(found)
 
 
-def ways(scene: Scene, parts: Sequence[Group]) -> list[list[Way]]:
+def ways(scene: Scene, parts: Sequence[VesselGroup]) -> list[list[Way]]:
     """Returns the ways by which each group may hang on the root.
 
     Raises TooManyWaysError.
@@ -146,8 +147,7 @@ def _neighbours(scene: Scene, docks: Sequence[Dock]) -> dict[str, list[Joint]]:
     for dock in docks:
         name = dock.name if switchable(scene, dock) else None
         for here, there in (dock.ports, dock.ports[::-1]):
-            parent, parent_port = here.split(".")
-            child, child_port = there.split(".")
+            (parent, parent_port), (child, child_port) = part_of(here), part_of(there)
             joint = Joint(parent, parent_port, child, child_port, name)
             neighbours.setdefault(parent, []).append(joint)
     return neighbours

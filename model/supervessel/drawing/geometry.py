@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from supervessel import reference
 from supervessel.composite.docks import joints, switchable
+from supervessel.scene.inputs import vessel_of
 from supervessel.scene.schema import Inputs, Scene, Vessel
 
 Array = NDArray[np.float64]
@@ -131,7 +132,7 @@ def assembly(scene: Scene) -> Assembly:
 def _attached(scene: Scene) -> Scene:
     """Returns the part of a scene that docks closed at the start join to the root."""
     names = {scene.root, *(joint.child for joint in joints(scene))}
-    closed = tuple(dock for dock in scene.docks if dock.docked and dock.ports[0].partition(".")[0] in names)
+    closed = tuple(dock for dock in scene.docks if dock.docked and vessel_of(dock.ports[0]) in names)
     vessels = {name: vessel for name, vessel in scene.vessels.items() if name in names}
     return scene.model_copy(update={"vessels": vessels, "docks": closed, "inputs": Inputs()})
 
@@ -186,7 +187,7 @@ def _force_points(scene: Scene, vessel: DrawnVessel, rotation: Array, origin: Ar
     """Yields the points of a vessel where forces act, if near enough to be drawn."""
     for name in scene.inputs.force:
         position = origin + rotation @ np.array(scene.point(name).position)
-        if name.partition(".")[0] == vessel.name and _near(position):
+        if vessel_of(name) == vessel.name and _near(position):
             yield DrawnPoint(name, vessel, position)
 
 

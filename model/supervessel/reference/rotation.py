@@ -14,7 +14,8 @@ from supervessel.reference.assembly import (
     points,
     vector,
 )
-from supervessel.scene.schema import ORIGIN, VESSEL_OUTPUT_NAMES, Scene
+from supervessel.scene.outputs import VESSEL_OUTPUTS
+from supervessel.scene.schema import ORIGIN, Scene
 
 
 def rotation_matrix(attitude: ArrayLike) -> Array:
@@ -234,9 +235,7 @@ def vessel_outputs(
     drift = whole.masses @ whole.velocities / whole.masses.sum()
     outputs: dict[str, Array] = {}
     for vessel, table in scene.vessels.items():
-        outputs |= {
-            f"{vessel}.{name}": np.zeros(4 if name == "attitude" else 3) for name in VESSEL_OUTPUT_NAMES
-        }
+        outputs |= {f"{vessel}.{name}": np.zeros(4 if name == "attitude" else 3) for name in VESSEL_OUTPUTS}
         if vessel not in found:
             continue
         motion, part = found[vessel], own[vessel]

@@ -5,7 +5,7 @@ leaves with its share, so that the rest keeps its rate; masses and moments chang
 of ports, each keeping rate or momentum as the scene says; what docks brings its momentum along.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 
@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike
 from supervessel.composite.bodies import composite_body
 from supervessel.composite.inertia import from_upper_triangle, ldl, ldl_solve
 from supervessel.composite.poses import constant
+from supervessel.composite.resolved import ResolvedScene
 from supervessel.rotation.laws import LAWS
-from supervessel.scene.schema import Scene
-from supervessel.scene.variables import input_variables
+from supervessel.scene.variables import InputVariable
 
 Parts = Mapping[str, ca.SX]
 """Parts of c by name."""
@@ -43,7 +43,7 @@ class Change:
 
 
 def change_functions(
-    scene: Scene, c: ca.SX, parts_of: Callable[[ca.SX], Parts], p: ca.SX, k: ca.SX
+    resolved: ResolvedScene, c: ca.SX, parts_of: Callable[[ca.SX], Parts], p: ca.SX, k: ca.SX
 ) -> Change:
     """Returns the functions of what changes.
 
@@ -51,7 +51,7 @@ def change_functions(
     parts_of : composite -> its parts
     p, k     : symbols of the inputs that shape the composite, of the motion at contact
     """
-    law = LAWS[scene.rotation.law]
+    law = LAWS[resolved.scene.rotation.law]
     omega, added, d = ca.SX.sym("omega", 3), ca.SX.sym("added", 3), ca.SX.sym("d", c.numel())
     before, after = parts_of(c), parts_of(d)
     kept, kept_after = (law.keeping(from_upper_triangle(parts["inertia"])) for parts in (before, after))
@@ -66,7 +66,7 @@ def change_functions(
         keep_momentum=_function(
             "keep_momentum", {"omega": omega, "c": c, "d": d}, omega - ldl_solve(*ldl(kept_after), change)
         ),
-        contact_momentum=_function("contact_momentum", {"p": p, "k": k}, _contact_momentum(scene, p, k)),
+        contact_momentum=_function("contact_momentum", {"p": p, "k": k}, _contact_momentum(resolved, p, k)),
         docked_rate=_function(
             "docked_rate",
             {"omega": omega, "momentum": added, "d": d},
@@ -76,7 +76,7 @@ def change_functions(
 
 
 def followed(
-    scene: Scene, change: Change, composite: ca.Function, margins: slice, inputs: tuple[ca.SX, ...]
+    resolved: ResolvedScene, change: Change, composite: ca.Function, margins: slice, inputs: tuple[ca.SX, ...]
 ) -> ca.SX:
     """Returns the angular velocity, (3,) [rad/s], after a change of inputs, in the order of this module.
 
@@ -87,7 +87,7 @@ def followed(
     that keeps the momentum, else NaN (the FMU refuses it).
     """
     omega, before, after, k = inputs
-    kinds = [kind_of_change(v.group) for v in input_variables(scene) if v.part == "shape"]
+    kinds = [variable.kind.change for variable in resolved.shaping]
 
     def taken(stage: ca.SX, kind: str) -> ca.SX:
         """Returns a stage with the inputs of a kind as they are after the change."""
@@ -105,7 +105,7 @@ def followed(
 
     flags = [i for i, kind in enumerate(kinds) if kind == "docked"]
     stage = ca.vertcat(*(before[i] * after[i] if i in flags else before[i] for i in range(len(kinds))))
-    for kind, kept in scene.keeps.items():
+    for kind, kept in resolved.scene.keeps.items():
         following = taken(stage, kind)
         if kept == "momentum":
             omega = kept_over(omega, stage, following)
@@ -117,11 +117,6 @@ def followed(
     return omega
 
 
-def kind_of_change(group: str) -> str:
-    """Returns which kind of change an input makes: "mass" (and moments), "docked", or "pose"."""
-    return {"mass": "mass", "pmi": "mass", "docked": "docked"}.get(group.rpartition(".")[2], "pose")
-
-
 def _spin(parts: Parts) -> ca.SX:
     return parts["momentum"][:3] if "momentum" in parts else ca.SX.zeros(3)
 
@@ -130,34 +125,33 @@ def _function(name: str, arguments: Mapping[str, ca.SX], result: ca.SX) -> ca.Fu
     return ca.Function(name, list(arguments.values()), [ca.densify(result)], list(arguments), ["result"])
 
 
-def _contact_momentum(scene: Scene, p: ca.SX, k: ca.SX) -> ca.SX:
+def _contact_momentum(resolved: ResolvedScene, p: ca.SX, k: ca.SX) -> ca.SX:
     """Returns the angular momentum about the barycentre, (3,), of parts that move with k as they touch."""
-    if not scene.inputs.docked:
+    if not resolved.contact:
         return ca.SX.zeros(3)
-    still = [f"{name}.{key}" for name in scene.inputs.motion for key in ("velocity", "rate")]
-    lookup = lookup_in(scene, ca.vertcat(p, k), ("shape", "contact"))
+    still = {variable.group for variable in resolved.shaping if variable.kind.key == "motion"}
+    lookup = lookup_in((*resolved.shaping, *resolved.contact), ca.vertcat(p, k))
 
     def at_contact(group: str, value: ArrayLike) -> ca.SX:
         return constant(np.zeros(3)) if group in still else lookup(group, value)
 
-    spin = composite_body(scene, at_contact).spin
+    spin = composite_body(resolved, at_contact).spin
     return ca.SX.zeros(3) if spin is None else spin
 
 
-def lookup_in(scene: Scene, values: ca.SX, parts: tuple[str, ...]) -> Callable[[str, ArrayLike], ca.SX]:
+def lookup_in(inputs: Sequence[InputVariable], values: ca.SX) -> Callable[[str, ArrayLike], ca.SX]:
     """Returns the function that takes an input's name without index and the scene's value to its symbols.
 
-    values : those of the inputs of these parts, in the order of the model description
+    values : those of the inputs
     """
-    of_parts = [variable for variable in input_variables(scene) if variable.part in parts]
     first: dict[str, int] = {}
-    for place, variable in enumerate(of_parts):
+    for place, variable in enumerate(inputs):
         first.setdefault(variable.group, place)
 
     def lookup(group: str, value: ArrayLike) -> ca.SX:
         if group not in first:
             return constant(value)
         place = first[group]
-        return values[place : place + (3 if of_parts[place].name.endswith("]") else 1)]
+        return values[place : place + (inputs[place].kind.elements or 1)]
 
     return lookup

@@ -9,14 +9,14 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from supervessel.problems import listed, printable, quantity, toml_key
+from supervessel.rotation.propagators import PROPAGATORS
+from supervessel.scene.inputs import by_group
 from supervessel.scene.numbers import Vector, is_number, triangle_problem, vector_length
 from supervessel.scene.schema import (
     CHOSEN,
     MOST_STEPS,
     PARALLEL_LIMIT,
     PERPENDICULAR_LIMIT,
-    VARIABLE_UNITS,
-    input_groups,
     tables,
 )
 
@@ -129,10 +129,9 @@ def _without_range(inputs: Mapping[str, Any]) -> Iterator[str]:
     """Yields inputs, docks apart, that have no range; vectors of which no element has one by their name."""
     ranges = inputs.get("range")
     known = ranges if isinstance(ranges, Mapping) else {}
-    for group, size in input_groups(inputs).items():
-        if group in known or group.endswith(".docked"):
+    for group, (kind, elements) in by_group(inputs).items():
+        if group in known or kind.boolean:
             continue
-        elements = [f"{group}[{i}]" for i in range(1, size + 1)] or [group]
         missing = [name for name in elements if name not in known]
         yield from missing if len(missing) < len(elements) else [group]
 
@@ -140,18 +139,20 @@ def _without_range(inputs: Mapping[str, Any]) -> Iterator[str]:
 def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:
     inputs = raw.get("inputs")
     ranges = inputs.get("range") if isinstance(inputs, Mapping) else None
+    groups = by_group(inputs) if isinstance(inputs, Mapping) else {}
+    known = {name: kind for kind, names in groups.values() for name in names}
+    known |= {group: kind for group, (kind, _) in groups.items()}
     for name, bounds in ranges.items() if isinstance(ranges, Mapping) else ():
         if not (isinstance(bounds, list | tuple) and len(bounds) == 2 and all(map(is_number, bounds))):
             continue
         low, high = map(float, bounds)
-        kind = name.rpartition(".")[2].partition("[")[0]
-        path = f'inputs.range."{printable(name)}" = {quantity((low, high), VARIABLE_UNITS.get(kind, ""))}'
+        kind = known.get(name)
+        unit = kind.unit if kind else ""
+        path = f'inputs.range."{printable(name)}" = {quantity((low, high), unit)}'
         if low > high:
             yield f"{path}: low must not exceed high"
-        elif kind == "mass" and low < 0.0:
-            yield f"{path}: a mass must be >= 0 kg"
-        elif kind == "pmi" and low < 0.0:
-            yield f"{path}: a moment must be >= 0 m2"
+        elif kind and kind.lowest is not None and low < kind.lowest:
+            yield f"{path}: {kind.noun} must be >= {kind.lowest:g} {kind.unit}"
 
 
 def _total_mass(raw: Mapping[str, Any]) -> Iterator[str]:
@@ -174,12 +175,11 @@ def _propagator(raw: Mapping[str, Any]) -> Iterator[str]:
     rotation, inputs = (raw.get(key, {}) for key in ("rotation", "inputs"))
     if not (isinstance(rotation, Mapping) and isinstance(inputs, Mapping)):
         return
-    if rotation.get("propagator") != "split":
-        return
-    if rotation.get("law") == "none":
-        yield 'rotation.propagator = "split": must be "exact" for rotation.law = "none": torque does nothing'
-    elif not any(inputs.get(key) for key in ("torque", "force", "vessel_torque")):
-        yield 'rotation.propagator = "split": must be "exact" or "auto" without inputs.torque'
+    name = rotation.get("propagator")
+    method = PROPAGATORS.get(name) if isinstance(name, str) else None
+    reason = method.suits(str(rotation.get("law", "")), inputs) if method else ""
+    if reason:
+        yield f'rotation.propagator = "{name}": {reason}'
 
 
 def _changes(raw: Mapping[str, Any]) -> Iterator[str]:
@@ -196,6 +196,3 @@ def _changes(raw: Mapping[str, Any]) -> Iterator[str]:
             yield 'inputs.motion: makes no sense with rotation.law = "none": the rate never changes'
     if rotation.get("pose_change") == "rate" and inputs.get("motion"):
         yield 'rotation.pose_change = "rate": must be "momentum" where inputs.motion lists ports'
-    if rotation.get("propagator") in ("split", "taylor") and inputs.get("motion"):
-        allowed = '"auto", "rk4", "dop853" or "exact" where inputs.motion lists ports'
-        yield f'rotation.propagator = "{rotation["propagator"]}": must be {allowed}'

@@ -9,7 +9,8 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any
 
 from supervessel.problems import listed, printable, quantity, toml_key, unknown
-from supervessel.scene.schema import OUTPUT_NAMES, VESSEL_OUTPUT_NAMES, input_groups
+from supervessel.scene.inputs import InputKind, by_group, kinds, part_of, rows_by_key, vessel_of
+from supervessel.scene.outputs import OUTPUTS, VESSEL_OUTPUTS
 
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 MODEL_NAME = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*_?")
@@ -29,18 +30,12 @@ Ports = Mapping[str, Collection[str]]
 
 RESERVED = frozenset(
     (
-        *OUTPUT_NAMES,
+        *OUTPUTS,
+        *(kind.quantity for kind in kinds() if kind.part != "shape"),
+        "docked",
         "time",
         "state",
         "der",
-        "torque",
-        "force",
-        "docked",
-        "velocity",
-        "rate",
-        "principal_moments",
-        "principal_axes",
-        "error_estimate",
         "angular_velocity_start",
         "attitude_start",
     )
@@ -165,7 +160,7 @@ def _port_problem(name: object, ports: Ports, kind: str = "port") -> str:
     """Returns why `name` is no port (or point) of the scene, or "" if it is one."""
     if not isinstance(name, str) or name.count(".") != 1:
         return f'{quantity(name)} must be a {kind}, written "vessel.{kind}"'
-    vessel, port = name.split(".")
+    vessel, port = part_of(name)
     if vessel not in ports:
         return unknown("vessel", vessel, ports)
     if port not in ports[vessel]:
@@ -201,7 +196,7 @@ def _docks(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
             for name in names
             if name in occupied
         )
-        vessels = [name.partition(".")[0] for name in names]
+        vessels = [vessel_of(name) for name in names]
         if not all(vessel in ports for vessel in vessels):
             complete = False
         elif vessels[0] == vessels[1]:
@@ -237,58 +232,52 @@ def _inputs(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
     inputs, points = _table(raw, "inputs"), _parts(raw, "points")
     docked = {name for dock in _list(raw, "docks") for name in _named(dock, "ports")}
     all_resolved = all(_is_port(name, ports) for name in docked)
-    posed = _named(inputs, "pose")
+    lists = {kind.within: _named(inputs, kind.within) for kind in kinds() if kind.within}
     docks = dict.fromkeys(_dock_names(raw).values())
 
-    def pose_problem(key: str, name: str) -> str | None:
+    def port_problem(kind: InputKind, name: str) -> str | None:
         problem = _port_problem(name, ports)
-        if not problem and key == "motion" and name not in posed:
-            return f"{printable(name)} is not listed in inputs.pose; only a pose that is an input moves"
+        if not problem and kind.within and name not in lists[kind.within]:
+            rule = f"is not listed in inputs.{kind.within}; only a pose that is an input moves"
+            return f"{printable(name)} {rule}"
         if not problem and name not in docked and all_resolved:
             return f"{printable(name)} is not docked; its pose would change nothing"
         return problem
 
-    def vessel_problem(key: str, name: str) -> str | None:
+    def vessel_problem(kind: InputKind, name: str) -> str | None:
         if name not in ports:
             return unknown("vessel", name, ports)
-        if key == "pmi" and "inertia" in _table(_table(raw, "vessels"), name):
+        if kind.given_by == "pmi" and "inertia" in _table(_table(raw, "vessels"), name):
             return f"{printable(name)} is given by inertia; only a vessel given by pmi has this input"
         return None
 
-    def problem_of(key: str, name: str) -> str | None:
-        if key in ("pose", "motion"):
-            return pose_problem(key, name)
-        if key == "docked":
+    def problem_of(kind: InputKind, name: str) -> str | None:
+        if kind.owner == "port":
+            return port_problem(kind, name)
+        if kind.owner == "dock":
             return None if name in docks else unknown("dock", name, docks)
-        if key == "force":
+        if kind.owner == "point":
             return _port_problem(name, points, "point")
-        return vessel_problem(key, name)
+        return vessel_problem(kind, name)
 
-    for key in ("mass", "pmi", "pose", "motion", "docked", "force", "vessel_torque"):
+    for key, kind in rows_by_key().items():
         names = [name for name in _list(inputs, key) if isinstance(name, str)]
         place = f"inputs.{key}"
         yield from (f"{place}: {problem}" for problem in _repeated(names))
         for name in dict.fromkeys(names):
-            problem = problem_of(key, name)
+            problem = problem_of(kind, name)
             if problem:
                 yield f"{place}: {problem}"
 
 
-def _groups(raw: Mapping[str, Any]) -> dict[str, int]:
-    """Returns the inputs that the scene asks for: name without index -> elements (scalar: 0)."""
-    inputs = _table(raw, "inputs")
-    lists = {key: _list(inputs, key) for key in inputs if key != "torque"}
-    return input_groups(lists | {"torque": inputs.get("torque")})
-
-
 def misnamed_courses(raw: Mapping[str, Any]) -> dict[str, str]:
     """Returns what is wrong with names in experiment.inputs, by name; what stands there is not looked at."""
-    groups = _groups(raw)
-    known = dict.fromkeys(one for name, size in groups.items() for one in _scalars(name, size))
+    groups = by_group(_table(raw, "inputs"))
+    known = dict.fromkeys(one for _, names in groups.values() for one in names)
     problems = {}
     for name, rows in _table(_table(raw, "experiment"), "inputs").items():
-        if groups.get(name):
-            quoted = ", ".join(f'"{one}"' for one in _scalars(name, groups[name]))
+        if name in groups and name not in known:
+            quoted = ", ".join(f'"{one}"' for one in groups[name][1])
             rule = "the elements of a vector are given one by one"
             problems[name] = f'experiment.inputs."{printable(name)}": {rule}: {quoted}'
         elif isinstance(rows, Mapping):
@@ -300,11 +289,6 @@ def misnamed_courses(raw: Mapping[str, Any]) -> dict[str, str]:
     return problems
 
 
-def _scalars(name: str, size: int) -> list[str]:
-    """Returns the elements of an input by their names; a size of 0 is that of a scalar."""
-    return [f"{name}[{i}]" for i in range(1, size + 1)] or [name]
-
-
 def _quoted(name: str, table: Mapping[str, Any]) -> str:
     """Returns the keys of a table as the names that they were meant to be part of."""
     return listed((f'"{name}.{key}"' for key in table), len(table))
@@ -312,9 +296,9 @@ def _quoted(name: str, table: Mapping[str, Any]) -> str:
 
 def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:
     inputs = _table(raw, "inputs")
-    groups = {name: size for name, size in _groups(raw).items() if not name.endswith(".docked")}
+    groups = {group: names for group, (kind, names) in by_group(inputs).items() if not kind.boolean}
     known = dict.fromkeys(groups)
-    known |= dict.fromkeys(one for name, size in groups.items() for one in _scalars(name, size))
+    known |= dict.fromkeys(one for names in groups.values() for one in names)
     for name, bounds in _table(inputs, "range").items():
         if isinstance(bounds, Mapping):
             rule = "the name of an input stands in quotes here"
@@ -328,11 +312,11 @@ def _outputs(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
     yield from (f"outputs.names: {problem}" for problem in _repeated(names))
     for name in dict.fromkeys(names):
         vessel, dot, output = name.partition(".")
-        if dot and vessel in ports and output in VESSEL_OUTPUT_NAMES:
+        if dot and vessel in ports and output in VESSEL_OUTPUTS:
             continue
         if dot and vessel in ports:
-            yield f"outputs.names: {unknown(f'output of {vessel}', output, VESSEL_OUTPUT_NAMES)}"
-        elif dot and output in VESSEL_OUTPUT_NAMES:
+            yield f"outputs.names: {unknown(f'output of {vessel}', output, VESSEL_OUTPUTS)}"
+        elif dot and output in VESSEL_OUTPUTS:
             yield f"outputs.names: {unknown('vessel', vessel, ports)}"
-        elif name not in OUTPUT_NAMES:
-            yield f"outputs.names: {unknown('output', name, OUTPUT_NAMES)}"
+        elif name not in OUTPUTS:
+            yield f"outputs.names: {unknown('output', name, OUTPUTS)}"

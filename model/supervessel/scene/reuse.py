@@ -1,28 +1,27 @@
-"""What follows from a scene and is asked for by one module after the other."""
+"""What follows from a scene alone and is asked for again and again."""
 
 from collections.abc import Callable
 from functools import wraps
 from typing import TypeVar
 
-from supervessel.scene.schema import Scene
-
+Given = TypeVar("Given")
 Result = TypeVar("Result")
 
 
-def latest(function: Callable[[Scene], Result]) -> Callable[[Scene], Result]:
-    """Returns the function with its latest result at hand: that of the same scene is not made again.
+def reused(function: Callable[[Given], Result]) -> Callable[[Given], Result]:
+    """Returns the function with its latest result at hand: for the same argument it is not made again.
 
-    A scene does not change; nor may the result, which all callers share.
+    The same is the very same object. Neither it nor the result, which all callers share, may change.
     """
-    kept: list[tuple[Scene, Result]] = []
+    kept: list[tuple[Given, Result]] = []
 
     @wraps(function)
-    def call(scene: Scene) -> Result:
+    def call(given: Given) -> Result:
         for known, result in tuple(kept):
-            if known is scene:
+            if known is given:
                 return result
-        result = function(scene)
-        kept[:] = [(scene, result)]
+        result = function(given)
+        kept[:] = [(given, result)]
         return result
 
     return call

@@ -11,6 +11,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from supervessel.problems import quantity
 from supervessel.rotation.propagators import PROPAGATORS
+from supervessel.scene.inputs import part_of
 from supervessel.scene.numbers import (
     Angle,
     AngularVelocity,
@@ -39,51 +40,6 @@ PERPENDICULAR_LIMIT = 1e-3
 
 MOST_STEPS = 1_000_000
 """Communication steps that are flown: each input that moves takes eight bytes of each."""
-
-OUTPUT_NAMES = (
-    "mass",
-    "barycentre",
-    "pmi",
-    "inertia",
-    "angular_velocity",
-    "attitude",
-    "kinetic_energy",
-    "angular_momentum",
-    "principal_moments",
-    "principal_axes",
-    "error_estimate",
-    "net_force",
-)
-"""Outputs of the whole."""
-
-VESSEL_OUTPUT_NAMES = ("origin", "centre_of_mass", "attitude", "angular_velocity", "angular_momentum")
-"""Outputs of a vessel, written "vessel.output"."""
-
-VARIABLE_UNITS = {
-    "mass": "kg",
-    "pmi": "m2",
-    "position": "m",
-    "direction": "",
-    "alignment": "",
-    "velocity": "m/s",
-    "rate": "rad/s",
-    "docked": "",
-    "torque": "N.m",
-    "force": "N",
-    "barycentre": "m",
-    "inertia": "kg.m2",
-    "angular_velocity": "rad/s",
-    "attitude": "",
-    "kinetic_energy": "J",
-    "angular_momentum": "N.m.s",
-    "principal_moments": "kg.m2",
-    "principal_axes": "",
-    "error_estimate": "rad",
-    "net_force": "N",
-    "origin": "m",
-    "centre_of_mass": "m",
-}
-"""Units of inputs and outputs by the last part of their names, as FMI writes them; "" for a pure number."""
 
 
 class Table(BaseModel):
@@ -280,7 +236,7 @@ class Scene(Table):
             >>> scene.port("DG.nose").direction
             (0.0, 0.0, -1.0)
         """
-        vessel, port = name.split(".")
+        vessel, port = part_of(name)
         return self.vessels[vessel].ports[port]
 
     def point(self, name: str) -> Point:
@@ -291,7 +247,7 @@ class Scene(Table):
             Traceback (most recent call last):
             KeyError: 'thruster'
         """
-        vessel, point = name.split(".")
+        vessel, point = part_of(name)
         return self.vessels[vessel].points[point]
 
     def dock(self, name: str) -> Dock:
@@ -385,28 +341,3 @@ def tables(raw: Any, key: str) -> list[tuple[str, Mapping[str, Any]]]:
     value = raw.get(key) if isinstance(raw, Mapping) else None
     found = value.items() if isinstance(value, Mapping) else ()
     return [(name, table) for name, table in found if isinstance(table, Mapping)]
-
-
-def input_groups(inputs: Mapping[str, Any]) -> dict[str, int]:
-    """Returns the inputs that the lists of `[inputs]` ask for: name without index -> elements (scalar: 0).
-
-    inputs : the table by its keys; what is missing is empty
-    The order is that of the FMU's model description: what shapes the composite, the motion at contact, what
-    acts.
-    """
-
-    def names(key: str) -> list[str]:
-        return [name for name in inputs.get(key, ()) if isinstance(name, str)]
-
-    groups = {f"{name}.mass": 0 for name in names("mass")}
-    groups |= {f"{name}.pmi": 3 for name in names("pmi")}
-    moving = set(names("motion"))
-    for name in names("pose"):
-        parts = ("position", "direction", "alignment", *(("velocity", "rate") if name in moving else ()))
-        groups |= {f"{name}.{part}": 3 for part in parts}
-    groups |= {f"{name}.docked": 0 for name in names("docked")}
-    for name in names("docked"):
-        groups |= {f"{name}.velocity": 3, f"{name}.rate": 3}
-    groups |= {"torque": 3} if inputs.get("torque") is True else {}
-    groups |= {f"{name}.force": 3 for name in names("force")}
-    return groups | {f"{name}.torque": 3 for name in names("vessel_torque")}

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from threading import current_thread, main_thread
 from types import FrameType
 
-from supervessel import ending
+from supervessel.shell import ending
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 

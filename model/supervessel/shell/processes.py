@@ -13,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import ParamSpec, Self, TypeVar
 
-from supervessel import ending
+from supervessel.shell import ending
 from supervessel.shell.interrupts import uninterrupted
 
 P = ParamSpec("P")

@@ -1,1 +1,5 @@
-"""What the twin offers for control: checked functions, errors of attitude, linear models, generated C."""
+"""The CasADi twin: checked functions of the FMU's own equations, error states, linear models, generated C."""
+
+from supervessel.twin.twin import Twin
+
+__all__ = ["Twin"]

@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 
+from supervessel.scene.inputs import TORQUE
+
 if TYPE_CHECKING:
     from supervessel.twin import Twin
 
@@ -30,7 +32,7 @@ def do_mpc_model(twin: "Twin", step: float | None) -> Any:
     model = Model("continuous" if step is None else "discrete", "SX")
     attitude = model.set_variable("_x", "attitude", (4, 1))
     rate = model.set_variable("_x", "angular_velocity", (3, 1))
-    name = "torque" if all(name.startswith("torque[") for name in twin.u_names) else "u"
+    name = "torque" if all(variable.kind is TORQUE for variable in twin.u_variables) else "u"
     x, u = ca.vertcat(attitude, rate), model.set_variable("_u", name, (len(twin.u_names), 1))
     p = model.set_variable("_p", "p", (len(twin.p_names), 1)) if twin.p_names else ca.SX(0, 1)
     right = twin.ode(x, u, p) if step is None else twin.step(x, u, p, step)

@@ -8,9 +8,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fmu_build.accuracy import choose
 from supervessel.composite.inertia import from_upper_triangle
 from supervessel.equations import composite_slices, equations, p_start, simplification
+from supervessel.fmu import choose
 from supervessel.rotation.changes import followed
 from supervessel.rotation.propagators.exact import free_step
 from supervessel.scene.schema import PROPAGATOR_NAMES, Scene
@@ -54,13 +54,15 @@ class Plant:
             scene = scene.model_copy(update={"rotation": rotation})
         self.scene, self.doublings, self.error_form = scene, doublings, error_form
         self._model = equations(scene)
-        names = self._model.p_names + self._model.k_names
+        inputs = (*self._model.resolved.shaping, *self._model.resolved.contact)
         start = np.append(p_start(scene), np.zeros(len(self._model.k_names)))
-        constants = settled(fixed, names, start)
-        free = [i for i in range(len(names)) if i not in constants]
-        self.p_names = tuple(names[i] for i in free)
+        constants = settled(fixed, inputs)
+        free = [i for i in range(len(inputs)) if i not in constants]
+        self._p_variables = [inputs[i] for i in free]
+        self.p_names = tuple(variable.name for variable in self._p_variables)
+        self.u_variables = self._model.resolved.acting
         self.u_names, self.x_names = self._model.u_names, X_NAMES
-        self.y_names = tuple(name for name in self._model.y_names if name != "error_estimate")
+        self.y_names = tuple(v.name for v in self._model.resolved.outputs if not v.kind.of_step)
         self.p = ca.SX.sym("p", len(free))
         self.u = ca.SX.sym("u", len(self.u_names))
         self.x = ca.SX.sym("x", len(self.x_names))
@@ -68,7 +70,7 @@ class Plant:
         self.p_start = start[free]
         """The scene's values of p, (n,)."""
         symbols = dict(zip(free, ca.vertsplit(self.p) if free else [], strict=True))
-        elements = (symbols[i] if i in symbols else ca.SX(constants[i]) for i in range(len(names)))
+        elements = (symbols[i] if i in symbols else ca.SX(constants[i]) for i in range(len(inputs)))
         self._inputs = ca.vertcat(ca.SX(0, 1), *elements)
         # CasADi turns x * (1/y) into x/y when the two meet in one graph. The FMU computes 1/y once for each
         # change of inertia, so the twin must multiply by it as well to give the same last bit.
@@ -99,7 +101,7 @@ class Plant:
             np.float64(12000.0)
         """
         p = self.p_start.copy()
-        for i, value in placed_values(values, self.p_names).items():
+        for i, value in placed_values(values, self._p_variables).items():
             p[i] = value
         return p
 
@@ -198,7 +200,7 @@ class Plant:
             inputs = (omega, self._inputs[:shaping], after[:shaping], after[shaping:])
             with simplification(False):
                 margins = composite_slices()["margins"]
-                omega = followed(self.scene, model.change, model.composite, margins, inputs)
+                omega = followed(model.resolved, model.change, model.composite, margins, inputs)
         x_next = ca.vertcat(self.x[:4], omega)
         return self._function("change", {"x": self.x, "p": self.p, "p_next": p_next}, {"x_next": x_next})
 

@@ -11,9 +11,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from fmu_build.compile.native import communication_step, generate
 from supervessel.composite.inertia import from_upper_triangle
 from supervessel.equations import composite_slices
+from supervessel.fmu import communication_step, generate
 from supervessel.problems import unknown
 from supervessel.rotation.attitude import to_inertial, unit
 from supervessel.rotation.laws import LAWS
@@ -249,7 +249,7 @@ class Twin(Plant):
         rate = np.full(3, 1.0 / time)
         moment = float(ca.trace(self.composite(self.p_start)[2])) / 3.0
         torque = np.full(len(self.u_names), moment / time**2)
-        groups = [name.partition("[")[0] for name in self.p_names]
+        groups = [variable.group for variable in self._p_variables]
         p = [
             max(abs(v) for v, g in zip(self.p_start, groups, strict=True) if g == group) or 1.0
             for group in groups

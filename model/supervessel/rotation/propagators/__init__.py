@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from supervessel.rotation.propagators import dop853, exact, rk4, split, taylor
 from supervessel.rotation.propagators.method import Propagator
+from supervessel.scene.inputs import listed
 
 if TYPE_CHECKING:
     from supervessel.scene.schema import Scene
@@ -21,10 +22,6 @@ PROPAGATORS: dict[str, Propagator] = {
     "split": split.PROPAGATOR,
 }
 """The methods; "auto" is a plan made of them."""
-
-
-CHANGING = ("mass", "pmi", "pose", "docked", "torque", "force", "vessel_torque")
-"""Inputs by which a motion may be other than free; Taylor steps know no spin of moving parts."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +49,14 @@ def plan_of(scene: "Scene") -> Plan:
         chosen = PROPAGATORS[name]
         return Plan(chosen if chosen.build else None, chosen.free)
     inputs = scene.inputs
-    if not any(getattr(inputs, key) for key in CHANGING):
+    if not any(listed(dict(inputs))):
         return Plan(None, "always")
-    return Plan(PROPAGATORS["dop853" if inputs.motion else "taylor"], "while free")
+    return Plan(PROPAGATORS[stepping(scene)], "while free")
+
+
+def stepping(scene: "Scene") -> str:
+    """Returns the name of the method that "auto" takes where the motion is not free."""
+    return "dop853" if PROPAGATORS["taylor"].suits(scene.rotation.law, dict(scene.inputs)) else "taylor"
 
 
 def description(scene: "Scene") -> str:

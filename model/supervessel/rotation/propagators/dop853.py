@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import casadi as ca
 
 from supervessel.rotation.attitude import unit
-from supervessel.rotation.propagators.method import Motion, Propagator, Step
+from supervessel.rotation.propagators.method import Propagator, Step, StepSymbols
 
 ORDER = 8
 """Exponent of the step in the estimated error of a step; the true one goes with a power more."""
@@ -124,7 +124,7 @@ def _combined(fifth: ca.SX, third: ca.SX) -> ca.SX:
     return square / ca.sqrt(ca.if_else(total > 0.0, total, 1.0))
 
 
-def build(motion: Motion) -> Step:
+def build(motion: StepSymbols) -> Step:
     """Returns one step with its estimate."""
     return Step(*dop853_step(motion.rate, motion.state, motion.step), ORDER)
 
@@ -135,5 +135,6 @@ PROPAGATOR = Propagator(
     "never",
     "The Runge-Kutta method DOP853 of order 8 ([HNW], code DOP853). A communication step is divided so that "
     "the estimated error of the attitude at its end stays below <code>tolerance</code>.",
+    marker="s",
     safety=5.0,
 )

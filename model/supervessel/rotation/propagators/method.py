@@ -1,8 +1,8 @@
 """What a method of propagation is: the form that each file of this package fills."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import casadi as ca
 
@@ -14,7 +14,7 @@ Free = Literal["never", "always", "between kicks"]
 
 
 @dataclass(frozen=True)
-class Motion:
+class StepSymbols:
     """What a step is built from, symbols or expressions of one scene.
 
     state        : attitude and angular velocity, (7,)
@@ -55,6 +55,18 @@ class Step:
     exponent: int
 
 
+Setting = Literal["max_angle_step", "tolerance", ""]
+"""Key of `[rotation]` that sets how fine the steps are."""
+
+
+STILL_PARTS = 'must be "auto", "rk4", "dop853" or "exact" where inputs.motion lists ports'
+
+
+def suits_any(law: str, inputs: Mapping[str, Any]) -> str:
+    """Returns "": a method that suits every scene."""
+    return ""
+
+
 @dataclass(frozen=True)
 class Propagator:
     """A method.
@@ -64,12 +76,18 @@ class Propagator:
               whose steps C takes by a loop of its own (fmu_build/c/taylor.c)
     free    : when it uses exact free motion
     text    : what it does, HTML
+    marker  : of its points in plots, as matplotlib names it
+    setting : what sets its steps
+    suits   : rotation law and table `[inputs]` -> why it makes no sense with them, "" where it does
     safety  : by how much the sum of estimates may exceed the tolerance: they are that much too large
               (measured in tests/model/test_controlled.py)
     """
 
-    build: Callable[[Motion], Step] | None
+    build: Callable[[StepSymbols], Step] | None
     control: Control
     free: Free
     text: str
+    marker: str
+    setting: Setting = "tolerance"
+    suits: Callable[[str, Mapping[str, Any]], str] = suits_any
     safety: float = 1.0

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import casadi as ca
 
 from supervessel.rotation.attitude import unit
-from supervessel.rotation.propagators.method import Motion, Propagator, Step
+from supervessel.rotation.propagators.method import Propagator, Step, StepSymbols
 
 
 def rk4_step(ode: Callable[[ca.SX], ca.SX], state: ca.SX, step: ca.SX) -> ca.SX:
@@ -25,7 +25,7 @@ def rk4_step(ode: Callable[[ca.SX], ca.SX], state: ca.SX, step: ca.SX) -> ca.SX:
     return ca.vertcat(unit(end[:4]), end[4:])
 
 
-def build(motion: Motion) -> Step:
+def build(motion: StepSymbols) -> Step:
     """Returns one step; its error, where asked for, is its distance to two half steps, times 16/15."""
     end = rk4_step(motion.rate, motion.state, motion.step)
     if not motion.with_error:
@@ -43,4 +43,6 @@ PROPAGATOR = Propagator(
     "The classical Runge-Kutta method of order 4 ([HNW] section II.1) for attitude and angular velocity "
     "jointly. A communication step is divided so that the body surely turns by no more than "
     "<code>max_angle_step</code> in a sub-step, spin-up by torque included.",
+    marker="o",
+    setting="max_angle_step",
 )

@@ -1,11 +1,15 @@
 """Free motion between two halves of the torque's kick: for weak torque, however fast the body turns."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import casadi as ca
 
-from supervessel.rotation.propagators.method import Motion, Propagator, Step
+from supervessel.rotation.propagators.method import STILL_PARTS, Propagator, Step, StepSymbols
+from supervessel.scene.inputs import acting
 
 
-def build(motion: Motion) -> Step:
+def build(motion: StepSymbols) -> Step:
     """Returns the state after the first half kick; free motion over the step and the same kick again follow.
 
     The symmetric splitting of order 2. Its error is that of the trapezoidal rule for what the torque does,
@@ -25,6 +29,17 @@ def build(motion: Motion) -> Step:
     return Step(kicked, ca.vertcat(attitude, rate), 3)
 
 
+def _suits(law: str, inputs: Mapping[str, Any]) -> str:
+    """Returns why kicks make no sense: without a torque, and where parts move."""
+    if law == "none":
+        return 'must be "exact" for rotation.law = "none": torque does nothing'
+    if inputs.get("motion"):
+        return STILL_PARTS
+    if not acting(inputs):
+        return 'must be "exact" or "auto" without inputs.torque'
+    return ""
+
+
 PROPAGATOR = Propagator(
     build,
     "error",
@@ -32,4 +47,6 @@ PROPAGATOR = Propagator(
     "Half of the torque's change of angular velocity, exact free motion over the step, the other half "
     "([HLW] section II.5). The steps keep an a-priori bound of the error within the tolerance; they are not "
     "limited by how fast the body turns, only by how strong the torque is.",
+    marker="v",
+    suits=_suits,
 )

@@ -1,14 +1,15 @@
 """Taylor series of attitude and angular velocity, unrolled to a fixed order."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import floor, log
 from operator import mul
+from typing import Any
 
 import casadi as ca
 
 from supervessel.rotation.attitude import unit
 from supervessel.rotation.laws import RotationLaw
-from supervessel.rotation.propagators.method import Motion, Propagator, Step
+from supervessel.rotation.propagators.method import STILL_PARTS, Propagator, Step, StepSymbols
 
 LEAST_ORDER, MOST_ORDER = 6, 20
 
@@ -142,11 +143,16 @@ def _remainder(last: Coefficients) -> ca.SX:
     return after / ca.sqrt(ca.if_else(before > 0.0, before, 1.0))
 
 
-def build(motion: Motion) -> Step:
+def build(motion: StepSymbols) -> Step:
     """Returns one step with its estimate, of the order that suits the scene's tolerance."""
     order = taylor_order(motion.tolerance)
     step = taylor_step(motion.law, motion.numbers, motion.torque, motion.state, motion.step, order)
     return Step(*step, order + 1)
+
+
+def _suits(law: str, inputs: Mapping[str, Any]) -> str:
+    """Returns why series make no sense: they know no momentum of parts that move."""
+    return STILL_PARTS if inputs.get("motion") else ""
 
 
 PROPAGATOR = Propagator(
@@ -156,5 +162,7 @@ PROPAGATOR = Propagator(
     "Taylor series of attitude and angular velocity ([JZ]), of an order from 6 to 20 that suits the "
     "tolerance. A communication step is divided so that the estimated error of the attitude at its end stays "
     "below <code>tolerance</code>.",
+    marker="D",
+    suits=_suits,
     safety=2.5,
 )

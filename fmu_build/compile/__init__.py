@@ -1,0 +1,1 @@
+"""C to shared libraries, by the compiler of the `ziglang` package."""

@@ -1,0 +1,37 @@
+"""An FMU's libraries, compiled from the files of its own sources/."""
+
+from collections.abc import Mapping, Sequence
+
+from fmu_build.compile.compiler import FLAGS, compile_binaries
+from fmu_build.errors import BuildError
+from fmu_build.platforms import Platform
+from fmu_build.storage.cache import cache_folder, kept_sources, reason
+from supervessel.problems import printable
+
+WHOLE = "whole.c"
+"""All of an FMU's C in one translation unit, so that the compiler inlines across files."""
+
+
+def compile_sources(  # noqa: PLR0913, PLR0917
+    packed: Mapping[str, bytes],
+    names: Sequence[str],
+    fmi: int,
+    platforms: Sequence[Platform],
+    identifier: str,
+    flags: Sequence[str] = FLAGS,
+) -> dict[str, bytes]:
+    """Returns an FMU's libraries by archive path, compiled from its own sources/.
+
+    packed     : the files of sources/ by archive path
+    names      : of the C files among them
+    identifier : the FMU's modelIdentifier
+    flags      : of the compiler
+    Raises BuildError if the compiler fails, or if what it reads and makes cannot be written.
+    """
+    whole = "".join(f'#include "sources/{name}"\n' for name in names)
+    try:
+        folder = kept_sources({**packed, WHOLE: whole.encode()})
+    except OSError as error:
+        place = error.filename or cache_folder()
+        raise BuildError(f"{printable(str(place))}: {reason(error, 'to compile in')}") from None
+    return compile_binaries([WHOLE], folder, platforms, fmi, identifier, flags)

@@ -1,0 +1,1 @@
+"""C that is particular to a scene, and the files that an FMU is compiled from."""

@@ -1,0 +1,46 @@
+"""What is particular to a scene in its FMU: the C files, and modelDescription.xml with their token."""
+
+from collections.abc import Sequence
+
+from fmu_build.generate.change_tables import change_tables
+from fmu_build.generate.scene_files import digest, model_source, scene_header, scene_source
+from fmu_build.generate.sources import source_file_names, source_files
+from fmu_build.generate.vessel_loop import loop_functions, loop_source, loop_steps, loop_tables
+from fmu_build.interface.model_description import model_description
+from fmu_build.interface.variable_table import TableEntry, variable_table
+from supervessel.equations import Equations, equations
+from supervessel.scene.schema import Scene
+
+TOKEN_IN_C = 'MODEL_TOKEN[] = "{}"'
+TOKEN_IN_XML = {2: 'guid="{}"', 3: 'instantiationToken="{}"'}
+"""Where the token stands that is made of everything else."""
+
+
+def generate(scene: Scene, fmi: int, model: Equations | None = None) -> tuple[dict[str, str], bytes]:
+    """Returns what is particular to a scene: its C files by name, and modelDescription.xml.
+
+    model : the scene's equations, if they are there already
+    """
+    model = model or equations(scene)
+    return generated(model, variable_table(model), fmi)
+
+
+def generated(model: Equations, entries: Sequence[TableEntry], fmi: int) -> tuple[dict[str, str], bytes]:
+    """Returns what `generate` does, from a scene's equations and variable table."""
+    scene, changing = model.resolved.scene, model.change is not None
+    loop = loop_tables(model)
+    functions = model.functions if loop is None else loop_functions(model)
+    tables = change_tables(model) + loop_source(loop)
+    sources = {
+        "model.c": model_source(functions),
+        "scene.h": scene_header(model, entries, functions, loop),
+        "scene.c": scene_source(entries, "", changing) + tables,
+        "lane_kernels.h": loop_steps(scene, loop),
+    }
+    names = source_file_names(sources, fmi)
+    without_token = model_description(scene, entries, "", fmi, names)
+    token = digest(*source_files(sources, fmi, scene.name).values(), without_token)
+    sources["scene.c"] = sources["scene.c"].replace(TOKEN_IN_C.format(""), TOKEN_IN_C.format(token))
+    attribute = TOKEN_IN_XML[fmi]
+    with_token = attribute.format(token).encode()
+    return sources, without_token.replace(attribute.format("").encode(), with_token, 1)

@@ -1,0 +1,1 @@
+"""What importers see of an FMU: its variables, their description in XML, terminals and icons."""

@@ -1,0 +1,1 @@
+"""An assembly as a picture: geometry of its vessels, figures, and their pixels."""

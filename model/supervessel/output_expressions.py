@@ -1,0 +1,81 @@
+"""The equation of each output, in CasADi symbols; `scene.outputs` has the row of each."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+
+from supervessel.composite.actions import net_force, vessel_outputs
+from supervessel.composite.inertia import from_upper_triangle
+from supervessel.composite.resolved import ResolvedScene
+from supervessel.rotation.attitude import to_inertial, unit
+
+
+@dataclass(frozen=True)
+class Known:
+    """What outputs follow from.
+
+    resolved : the scene whose outputs they are
+    attitude : (4,), of unit length
+    omega    : angular velocity, (3,) [rad/s], body axes
+    u        : the inputs that act
+    parts    : those of the composite by name, see `equations.composite_parts`; "principal", moments and axes,
+               (7,), zeros where nobody asks; "error_estimate" [rad]
+    inertia  : tensor about the barycentre, (3, 3) [kg m2], body axes
+    """
+
+    resolved: ResolvedScene
+    attitude: ca.SX
+    omega: ca.SX
+    u: ca.SX
+    parts: Mapping[str, ca.SX]
+    inertia: ca.SX
+
+    @cached_property
+    def turned(self) -> ca.SX:
+        """J omega, (3,) [N m s]: angular momentum without that of what moves relative to the body axes."""
+        return self.inertia @ self.omega
+
+
+def _momentum(known: Known) -> ca.SX:
+    turned, parts = known.turned, known.parts
+    momentum = turned + parts["momentum"][:3] if "momentum" in parts else turned
+    return to_inertial(known.attitude, momentum)
+
+
+EXPRESSIONS: dict[str, Callable[[Known], ca.SX]] = {
+    "mass": lambda known: known.parts["mass"],
+    "barycentre": lambda known: known.parts["barycentre"],
+    "pmi": lambda known: known.parts["pmi"],
+    "inertia": lambda known: ca.vec(known.inertia),
+    "angular_velocity": lambda known: known.omega,
+    "attitude": lambda known: known.attitude,
+    "kinetic_energy": lambda known: 0.5 * ca.dot(known.omega, known.turned),
+    "angular_momentum": _momentum,
+    "principal_moments": lambda known: known.parts["principal"][:3],
+    "principal_axes": lambda known: known.parts["principal"][3:],
+    "error_estimate": lambda known: known.parts["error_estimate"],
+    "net_force": lambda known: net_force(known.resolved, known.parts, known.u),
+}
+"""Of outputs of the whole, by name; those of vessels are in `composite.actions.vessel_outputs`."""
+
+
+def outputs_of(resolved: ResolvedScene, x: ca.SX, u: ca.SX, parts: Mapping[str, ca.SX]) -> ca.SX:
+    """Returns the scene's outputs, in its order.
+
+    x     : attitude and angular velocity, (7,)
+    parts : see `Known`
+    The attitude is brought to unit length once more: as a state it keeps it only to the accuracy of
+    whoever integrates it.
+    """
+    attitude, omega = unit(x[:4]), x[4:]
+    known = Known(resolved, attitude, omega, u, parts, from_upper_triangle(parts["inertia"]))
+    of_vessels: dict[str, ca.SX] = {}
+    for name in resolved.vessels_shown:
+        of_vessels |= vessel_outputs(name, parts[f".{name}"], attitude, omega)
+    shown = (
+        of_vessels[group] if group in of_vessels else EXPRESSIONS[group](known)
+        for group in resolved.scene.outputs.names
+    )
+    return ca.densify(ca.vertcat(*shown))

@@ -1,0 +1,1 @@
+"""How the assembly turns: attitude, rotation laws, principal axes, changes, and propagators."""

@@ -1,0 +1,343 @@
+"""The kinds of inputs that a scene may list, one row each: whatever names, checks or uses inputs reads them.
+
+A new kind is its row here, its key in `schema.Inputs`, and the place that gives its equation: for what shapes
+the composite `composite.bodies`, for what acts `composite.actions`.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from supervessel.scene.schema import Scene
+
+Part = Literal["shape", "contact", "action"]
+"""Whether an input shapes the composite, is the motion with which a part docks, or acts."""
+
+Change = Literal["mass", "pose", "docked", ""]
+"""What changes with an input: masses and moments, poses and their motion, docks; "": none of these."""
+
+Owner = Literal["vessel", "port", "dock", "point", ""]
+"""What the list of a scene names; "": the whole assembly, the key is then true or false."""
+
+Judge = Literal["MASS", "PMI", "PORT", ""]
+"""How the FMU judges the values of an owner together; see CHECK_... in fmu_build/c/variables.h."""
+
+Values = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class InputKind:
+    """A kind of input.
+
+    key         : of `[inputs]`, which lists the owners
+    quantity    : last part of the variables' names
+    owner       : what the list names
+    elements    : 3 for a vector, whose variables carry an index from 1; 0 for a scalar
+    unit        : as FMI writes it, "" for a pure number
+    part        : of the equations that it belongs to
+    change      : which kind of change its change is
+    description : of the variable, where {owner}, {vessel}, {axis} and of a dock its ports {first}, {second}
+                  and {first_vessel} are filled in
+    start       : scene, owner -> the scene's value, element by element
+    lowest      : least value that it can have, None where all are possible
+    noun        : what a problem calls it, "a mass"
+    boolean     : whether it is true or false, 1 or 0 as a number
+    directed    : whether only the direction of a vector matters, so that it must not be zero
+    judge       : how the FMU judges it
+    given_by    : key that a vessel's table must have for it, "" for any
+    within      : key of `[inputs]` whose list must have the owner too, "" for none
+    """
+
+    key: str
+    quantity: str
+    owner: Owner
+    elements: int
+    unit: str
+    part: Part
+    change: Change
+    description: str
+    start: Callable[["Scene", str], Values]
+    lowest: float | None = None
+    noun: str = "an input"
+    boolean: bool = False
+    directed: bool = False
+    judge: Judge = ""
+    given_by: str = ""
+    within: str = ""
+
+    def group(self, owner: str) -> str:
+        """Returns the name of an owner's input, without the index of an element."""
+        return f"{owner}.{self.quantity}" if owner else self.quantity
+
+    def names(self, owner: str) -> list[str]:
+        """Returns the names of an owner's variables, element by element."""
+        group = self.group(owner)
+        return [f"{group}[{i}]" for i in range(1, self.elements + 1)] or [group]
+
+    def words(self, scene: "Scene", owner: str, axis: str) -> str:
+        """Returns the description of an element of an owner's input."""
+        first, second = scene.dock(owner).ports if self.owner == "dock" else ("", "")
+        return self.description.format(
+            owner=owner,
+            vessel=vessel_of(owner),
+            first=first,
+            second=second,
+            first_vessel=vessel_of(first),
+            axis=axis,
+        )
+
+    def problem(self, values: Sequence[float]) -> str:
+        """Returns why an input can never have these values, whatever the others are, or "" if it may.
+
+        values : all elements, or some of them
+        """
+        if self.lowest is not None and min(values) < self.lowest:
+            return "must not be negative" if self.lowest == 0.0 else f"must be at least {self.lowest}"
+        if self.boolean and values[0] not in (0.0, 1.0):
+            return "must be 0 or 1"
+        if self.directed and len(values) == self.elements and not any(values):
+            return "must be longer than 0"
+        return ""
+
+
+def vessel_of(name: str) -> str:
+    """Returns the vessel's name in that of one of its parts, "vessel.port", or of the vessel itself."""
+    return name.partition(".")[0]
+
+
+def part_of(name: str) -> tuple[str, str]:
+    """Returns vessel and part of the name of a port or a point, "vessel.part"."""
+    vessel, part = name.split(".")
+    return vessel, part
+
+
+def _zero(scene: "Scene", owner: str) -> Values:
+    return (0.0, 0.0, 0.0)
+
+
+def _mass(scene: "Scene", owner: str) -> Values:
+    return (scene.vessels[owner].mass,)
+
+
+def _pmi(scene: "Scene", owner: str) -> Values:
+    pmi = scene.vessels[owner].pmi
+    assert pmi is not None
+    return pmi
+
+
+def _docked(scene: "Scene", owner: str) -> Values:
+    return (float(scene.dock(owner).docked),)
+
+
+MASS = InputKind(
+    "mass", "mass", "vessel", 0, "kg", "shape", "mass", "mass of {owner}", _mass, 0.0, "a mass", judge="MASS"
+)
+PMI = InputKind(
+    "pmi",
+    "pmi",
+    "vessel",
+    3,
+    "m2",
+    "shape",
+    "mass",
+    "mass-normalised moment of inertia of {owner} about its {axis} axis",
+    _pmi,
+    0.0,
+    "a moment",
+    judge="PMI",
+    given_by="pmi",
+)
+POSITION = InputKind(
+    "pose",
+    "position",
+    "port",
+    3,
+    "m",
+    "shape",
+    "pose",
+    "position of docking port {owner}, {axis} in the axes of {vessel}",
+    lambda scene, owner: scene.port(owner).position,
+)
+DIRECTION = InputKind(
+    "pose",
+    "direction",
+    "port",
+    3,
+    "",
+    "shape",
+    "pose",
+    "approach direction of docking port {owner}, outward, {axis} in the axes of {vessel}",
+    lambda scene, owner: scene.port(owner).direction,
+    directed=True,
+    judge="PORT",
+)
+ALIGNMENT = InputKind(
+    "pose",
+    "alignment",
+    "port",
+    3,
+    "",
+    "shape",
+    "pose",
+    "alignment direction of docking port {owner}, {axis} in the axes of {vessel}",
+    lambda scene, owner: scene.port(owner).alignment,
+    directed=True,
+)
+PORT_VELOCITY = InputKind(
+    "motion",
+    "velocity",
+    "port",
+    3,
+    "m/s",
+    "shape",
+    "pose",
+    "rate of change of the position of docking port {owner}, {axis} in the axes of {vessel}",
+    _zero,
+    within="pose",
+)
+PORT_RATE = InputKind(
+    "motion",
+    "rate",
+    "port",
+    3,
+    "rad/s",
+    "shape",
+    "pose",
+    "angular velocity of docking port {owner}, {axis} in the axes of {vessel}",
+    _zero,
+    within="pose",
+)
+DOCKED = InputKind(
+    "docked",
+    "docked",
+    "dock",
+    0,
+    "",
+    "shape",
+    "docked",
+    "whether {first} and {second} are docked",
+    _docked,
+    boolean=True,
+)
+CONTACT_VELOCITY = InputKind(
+    "docked",
+    "velocity",
+    "dock",
+    3,
+    "m/s",
+    "contact",
+    "",
+    "velocity at contact, of {second} relative to {first}, {axis} in the axes of {first_vessel}",
+    _zero,
+)
+CONTACT_RATE = InputKind(
+    "docked",
+    "rate",
+    "dock",
+    3,
+    "rad/s",
+    "contact",
+    "",
+    "angular velocity at contact, of {second} relative to {first}, {axis} in the axes of {first_vessel}",
+    _zero,
+)
+TORQUE = InputKind(
+    "torque",
+    "torque",
+    "",
+    3,
+    "N.m",
+    "action",
+    "",
+    "external torque about the barycentre, {axis} in body axes",
+    _zero,
+)
+FORCE = InputKind(
+    "force",
+    "force",
+    "point",
+    3,
+    "N",
+    "action",
+    "",
+    "external force at {owner}, {axis} in the axes of {vessel}",
+    _zero,
+)
+VESSEL_TORQUE = InputKind(
+    "vessel_torque",
+    "torque",
+    "vessel",
+    3,
+    "N.m",
+    "action",
+    "",
+    "external torque on {owner}, {axis} in its axes",
+    _zero,
+)
+
+BLOCKS: tuple[tuple[InputKind, ...], ...] = (
+    (MASS,),
+    (PMI,),
+    (POSITION, DIRECTION, ALIGNMENT, PORT_VELOCITY, PORT_RATE),
+    (DOCKED,),
+    (CONTACT_VELOCITY, CONTACT_RATE),
+    (TORQUE,),
+    (FORCE,),
+    (VESSEL_TORQUE,),
+)
+"""All kinds, in the order of the model description: shape, contact, action.
+
+The inputs of an owner that stand in one block follow each other; the first kind of a block lists the owners.
+"""
+
+
+def kinds() -> Iterator[InputKind]:
+    """Yields all kinds of inputs."""
+    for block in BLOCKS:
+        yield from block
+
+
+def rows_by_key() -> dict[str, InputKind]:
+    """Returns the first kind of each key of `[inputs]`, by key."""
+    found: dict[str, InputKind] = {}
+    for kind in kinds():
+        found.setdefault(kind.key, kind)
+    return found
+
+
+def by_name(inputs: Mapping[str, Any]) -> dict[str, InputKind]:
+    """Returns the kind of each input that the table `[inputs]` asks for, by the names of its variables."""
+    return {name: kind for kind, owner in listed(inputs) for name in kind.names(owner)}
+
+
+def by_group(inputs: Mapping[str, Any]) -> dict[str, tuple[InputKind, list[str]]]:
+    """Returns kind and variables' names of each input that `[inputs]` asks for, by its name without index."""
+    return {kind.group(owner): (kind, kind.names(owner)) for kind, owner in listed(inputs)}
+
+
+def acting(inputs: Mapping[str, Any]) -> bool:
+    """Whether the table `[inputs]` asks for a torque or a force."""
+    return any(kind.part == "action" for kind, _ in listed(inputs))
+
+
+def listed(inputs: Mapping[str, Any]) -> Iterator[tuple[InputKind, str]]:
+    """Yields kind and owner of each input that `[inputs]` asks for, in the order of the model description.
+
+    inputs : the table by its keys, as a file has it; what is missing is empty, what is no name is passed over
+    """
+    for block in BLOCKS:
+        owners = {kind.key: _owners(inputs, kind) for kind in block}
+        for owner in owners[block[0].key]:
+            for kind in block:
+                if owner in owners[kind.key]:
+                    yield kind, owner
+
+
+def _owners(inputs: Mapping[str, Any], kind: InputKind) -> dict[str, None]:
+    """Returns whom the inputs of a kind belong to, in order, each once; "" is the whole assembly."""
+    value = inputs.get(kind.key)
+    if not kind.owner:
+        return {"": None} if value is True else {}
+    names = value if isinstance(value, list | tuple) else ()
+    return dict.fromkeys(name for name in names if isinstance(name, str))

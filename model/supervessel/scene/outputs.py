@@ -1,0 +1,159 @@
+"""The kinds of outputs that a scene may list: one row each; `output_expressions` has the equation of each."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+AXES = ("x", "y", "z")
+QUATERNION = ("w", "x", "y", "z")
+NUMBERS = ("1", "2", "3")
+ROWS = tuple((i, j) for i in (1, 2, 3) for j in (1, 2, 3))
+
+
+@dataclass(frozen=True)
+class Magnitudes:
+    """Of the whole at the start: mass [kg], mean moment [kg m2], angular velocity [rad/s], 1 at rest."""
+
+    mass: float
+    moment: float
+    rate: float
+
+
+@dataclass(frozen=True)
+class OutputKind:
+    """A kind of output.
+
+    name        : of the output; that of a vessel is written "vessel.name"
+    unit        : as FMI writes it, "" for a pure number
+    description : of its variables, {vessel} is filled in
+    labels      : of its elements, which carry an index from 1; none for a scalar
+    of_vessel   : whether it is of a vessel, else of the whole
+    matrix      : whether it is a (3, 3) matrix, row by row, with two indices
+    axes        : whether it shows principal moments or axes, which are found only where somebody asks
+    of_step     : whether it follows from a communication step, so that the twin, which takes none, has it not
+    nominal     : its magnitude by those of the whole, for an importer's solver
+    """
+
+    name: str
+    unit: str
+    description: str
+    labels: tuple[str, ...] = AXES
+    of_vessel: bool = False
+    matrix: bool = False
+    axes: bool = False
+    of_step: bool = False
+    nominal: Callable[[Magnitudes], float] = lambda whole: 1.0
+
+    def elements(self, group: str) -> list[tuple[str, str]]:
+        """Returns name and label of each variable of an output; group: its name, with its vessel's."""
+        if self.matrix:
+            return [(f"{group}[{i},{j}]", f"{AXES[i - 1]}{AXES[j - 1]}") for i, j in ROWS]
+        return [(f"{group}[{i}]", label) for i, label in enumerate(self.labels, start=1)] or [(group, "")]
+
+
+OUTPUTS: dict[str, OutputKind] = {
+    kind.name: kind
+    for kind in (
+        OutputKind("mass", "kg", "total mass", (), nominal=lambda whole: whole.mass),
+        OutputKind("barycentre", "m", "barycentre in the root vessel's axes, from its origin"),
+        OutputKind(
+            "pmi",
+            "m2",
+            "diagonal of the inertia tensor over mass, body axes",
+            nominal=lambda whole: whole.moment / whole.mass,
+        ),
+        OutputKind(
+            "inertia",
+            "kg.m2",
+            "inertia tensor about the barycentre, body axes",
+            matrix=True,
+            nominal=lambda whole: whole.moment,
+        ),
+        OutputKind(
+            "angular_velocity",
+            "rad/s",
+            "angular velocity of the body relative to inertial space, body axes",
+            nominal=lambda whole: whole.rate,
+        ),
+        OutputKind("attitude", "", "unit quaternion from body to inertial axes", QUATERNION),
+        OutputKind(
+            "kinetic_energy",
+            "J",
+            "rotational kinetic energy",
+            (),
+            nominal=lambda whole: 0.5 * whole.moment * whole.rate * whole.rate,
+        ),
+        OutputKind(
+            "angular_momentum",
+            "N.m.s",
+            "angular momentum about the barycentre, inertial axes",
+            nominal=lambda whole: whole.moment * whole.rate,
+        ),
+        OutputKind(
+            "principal_moments",
+            "kg.m2",
+            "principal moment of inertia about the barycentre, ascending",
+            NUMBERS,
+            axes=True,
+            nominal=lambda whole: whole.moment,
+        ),
+        OutputKind(
+            "principal_axes",
+            "",
+            "unit quaternion from principal to body axes, of the four that fit the one with the "
+            "largest scalar part",
+            QUATERNION,
+            axes=True,
+        ),
+        OutputKind(
+            "error_estimate",
+            "rad",
+            "estimated error of the attitude that the last communication step added",
+            (),
+            of_step=True,
+        ),
+        OutputKind("net_force", "N", "sum of the forces, body axes"),
+    )
+}
+"""Outputs of the whole, by name."""
+
+VESSEL_OUTPUTS: dict[str, OutputKind] = {
+    kind.name: kind
+    for kind in (
+        OutputKind("origin", "m", "origin of {vessel}, from the barycentre, body axes", of_vessel=True),
+        OutputKind(
+            "centre_of_mass",
+            "m",
+            "centre of mass of {vessel}, from the barycentre, body axes",
+            of_vessel=True,
+        ),
+        OutputKind(
+            "attitude",
+            "",
+            "unit quaternion from the axes of {vessel} to body axes",
+            QUATERNION,
+            of_vessel=True,
+        ),
+        OutputKind(
+            "angular_velocity",
+            "rad/s",
+            "angular velocity of {vessel} relative to inertial space, its own axes",
+            of_vessel=True,
+            nominal=lambda whole: whole.rate,
+        ),
+        OutputKind(
+            "angular_momentum",
+            "N.m.s",
+            "share of {vessel} in the angular momentum about the barycentre, inertial axes",
+            of_vessel=True,
+            nominal=lambda whole: whole.moment * whole.rate,
+        ),
+    )
+}
+"""Outputs of a vessel, by name, written "vessel.name" in a scene; all zero while it is not docked to the
+root's part."""
+
+
+def output_kind(group: str) -> tuple[OutputKind, str]:
+    """Returns kind and vessel, "" for the whole, of an output that a scene lists. Raises KeyError."""
+    vessel, dot, name = group.rpartition(".")
+    return (VESSEL_OUTPUTS if dot else OUTPUTS)[name], vessel

@@ -1,0 +1,1 @@
+"""What commands need of the system: printing, interrupts, and programs run beside this one."""
