@@ -44,7 +44,18 @@ def model_source(functions: Iterable[ca.Function]) -> str:
         source = generated(generator, "model.c")
     if "#error" in source:
         raise BuildError("the equations hold something that cannot be generated as C")
-    return '#include "model.h"\n\n' + _without_null_checks(source)
+    return '#include "model.h"\n\n' + DEFINITION.sub(_dividing_as_written, _without_null_checks(source))
+
+
+DEFINITION = re.compile(r"^(static int casadi_f\d+\(.*\) \{\n)((?:(?!^\}).*\n)*)", re.MULTILINE)
+"""The beginning and the body of a function in generated C."""
+
+
+def _dividing_as_written(function: re.Match[str]) -> str:
+    """Returns a function of generated C; one that divides more than once begins with the prelude's macro."""
+    beginning, body = function.groups()
+    mark = "  DIVIDES_ONLY_AS_WRITTEN\n" if body.count("/") > 1 else ""
+    return beginning + mark + body
 
 
 def generated(generator: ca.CodeGenerator, file: str) -> str:

@@ -1,18 +1,18 @@
-"""Digests of the FMUs of a dozen scenes: what a change of the code's structure must leave as it is.
+"""Digests of what the FMUs of some thirty scenes are made of: a change of the code's structure must keep them.
 
 python tests/bench/witness.py > before.json; change; python tests/bench/witness.py --against before.json
 
-Of each scene and FMI version: the archive, model.c, the model description without its token, and the outputs
-of the FMU flown for some steps. Exit status 1 where something differs, each named on stderr.
+Of each scene and FMI version: the sources with model.c and token, the model description, and, but for the
+library, all the rest of the archive. With --fly the whole archive and the outputs of the FMU flown for 2 s
+too. Exit status 1 where something differs, each named on stderr.
 """
 
 import argparse
 import hashlib
 import json
-import re
 import sys
 import tempfile
-import zipfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,13 +20,15 @@ import numpy as np
 from fmpy import simulate_fmu
 
 from fmu_build import build_fmu
-from supervessel import load_scene, parse_scene
+from fmu_build.build import companions
+from fmu_build.generate.model import generate
+from fmu_build.interface.variable_table import variable_table
+from supervessel import Scene, load_scene, parse_scene
+from supervessel.equations import equations
 from support import ISS_DG, body, variant
 from support.costs import station
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-TOKEN = re.compile(rb"\{[0-9a-f]{64}\}")
-
 
 FORCES = {
     "vessels.DG.points": {"thruster": {"position": [1.0, 2.0, 3.0]}},
@@ -40,11 +42,10 @@ DOCKS = {
 }
 
 
-def scenes() -> dict[str, Any]:
+def scenes() -> dict[str, Scene]:
     """Returns scenes by name: the examples, all inputs, every law and propagator, docks, many vessels."""
     found = {path.stem: load_scene(path) for path in sorted(EXAMPLES.glob("*.toml"))}
-    many = [f"v{i}" for i in range(80)]
-    raw = {
+    raw: dict[str, Any] = {
         "everything": ISS_DG,
         "momentum": variant(ISS_DG, {"rotation": {"mass_change": "momentum"}}),
         "motion": variant(ISS_DG, {"inputs.motion": ["DG.nose"], "rotation": {"propagator": "dop853"}}),
@@ -52,48 +53,54 @@ def scenes() -> dict[str, Any]:
         "forces": variant(ISS_DG, FORCES),
         "docks": variant(ISS_DG, FORCES | DOCKS),
         "rest": variant(body(), {"inputs": {"torque": False}}),
-        "many_masses": station(80, many),
+        "many_masses": station(80, [f"v{i}" for i in range(80)]),
+        "many_poses": station(60, [f"v{i}" for i in range(60)]),
     }
+    docks = raw["many_poses"]["docks"]
+    raw["many_poses"]["inputs"]["pose"] = [port for dock in docks for port in dock["ports"]]
     raw |= {f"law_{law}": body(law=law) for law in ("none", "decoupled", "principal")}
     raw |= {name: body(propagator=name) for name in ("rk4", "dop853", "taylor", "exact", "split")}
-    poses = station(60, [f"v{i}" for i in range(60)])
-    poses["inputs"]["pose"] = [port for dock in poses["docks"] for port in dock["ports"]]
-    raw["many_poses"] = poses
     return found | {name: parse_scene(scene) for name, scene in raw.items()}
 
 
-def digests() -> dict[str, str]:
-    """Returns what there is to compare, by scene, FMI version and kind."""
-    found: dict[str, str] = {}
+def contents(scene: Scene) -> Iterator[tuple[str, bytes]]:
+    """Yields what goes into a scene's FMUs, without compiling."""
+    model = equations(scene)
+    for fmi in (2, 3):
+        sources, description = generate(scene, fmi, model)
+        for name, text in sources.items():
+            yield f"FMI {fmi} {name}", text.encode()
+        yield f"FMI {fmi} modelDescription.xml", description
+        for path, content in companions(model, variable_table(model), fmi).items():
+            yield f"FMI {fmi} {path}", content
+
+
+def flown(scene: Scene) -> Iterator[tuple[str, bytes]]:
+    """Yields a scene's archives, and the outputs of their flights."""
     with tempfile.TemporaryDirectory() as folder:
-        for name, scene in scenes().items():
-            for fmi in (2, 3):
-                print(name, fmi, file=sys.stderr)
-                path = build_fmu(scene, Path(folder, f"{name}_{fmi}.fmu"), fmi)
-                for kind, content in _contents(path).items():
-                    found[f"{name} FMI {fmi} {kind}"] = hashlib.sha256(content).hexdigest()
+        for fmi in (2, 3):
+            path = build_fmu(scene, Path(folder, f"{fmi}.fmu"), fmi)
+            yield f"FMI {fmi} archive", path.read_bytes()
+            rows = simulate_fmu(str(path), stop_time=2.0, output_interval=0.1, fmi_type="CoSimulation")
+            yield f"FMI {fmi} results", np.ascontiguousarray(rows.tolist()).tobytes()
+
+
+def digests(fly: bool) -> dict[str, str]:
+    """Returns what there is to compare, by scene, FMI version and part."""
+    found: dict[str, str] = {}
+    for name, scene in scenes().items():
+        parts = dict(contents(scene)) | (dict(flown(scene)) if fly else {})
+        found |= {f"{name} {part}": hashlib.sha256(text).hexdigest() for part, text in parts.items()}
     return found
-
-
-def _contents(path: Path) -> dict[str, bytes]:
-    with zipfile.ZipFile(path) as archive:
-        description, model = archive.read("modelDescription.xml"), archive.read("sources/model.c")
-    flown = simulate_fmu(str(path), stop_time=2.0, output_interval=0.1, fmi_type="CoSimulation")
-    values = np.ascontiguousarray(flown.tolist())
-    return {
-        "archive": path.read_bytes(),
-        "model.c": model,
-        "description": TOKEN.sub(b"", description),
-        "results": values.tobytes(),
-    }
 
 
 def main() -> int:
     """Prints digests, or compares them with those of a file."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--against", type=Path, metavar="BEFORE.json")
+    parser.add_argument("--fly", action="store_true", help="build and fly the FMUs too, some minutes")
     options = parser.parse_args()
-    found = digests()
+    found = digests(options.fly)
     if options.against is None:
         print(json.dumps(found, indent=1))
         return 0

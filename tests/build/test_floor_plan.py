@@ -8,7 +8,6 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from fmu_build.interface.table import variable_table
 from pydantic.fields import FieldInfo
 
 import fmu_build
@@ -17,6 +16,7 @@ from fmu_build.document.documentation import documentation
 from fmu_build.flight.choices import BEST, models
 from fmu_build.flight.experiment import acts
 from fmu_build.interface.terminals import terminals
+from fmu_build.interface.variable_table import variable_table
 from supervessel import SceneError, Twin, output_expressions, parse_scene
 from supervessel.equations import equations
 from supervessel.scene import inputs, outputs, schema

@@ -26,6 +26,7 @@ INPUTS = {"DG.mass": 12000.0, "torque[1]": 900.0, "torque[2]": -1500.0, "angular
 
 STANDARD_HEADERS = {path.name for path in fmi_headers().glob("fmi*.h")}
 LIBRARY_HEADERS = {
+    "fenv.h",
     "float.h",
     "math.h",
     "stdarg.h",

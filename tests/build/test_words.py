@@ -9,8 +9,8 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from fmu_build.build import generate
 from fmu_build.errors import BuildError
+from fmu_build.generate.model import generate
 from fmu_build.trade import TradeError
 from orbiter.files import Files
 from supervessel import SceneError, load_scene, parse_scene

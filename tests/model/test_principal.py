@@ -10,9 +10,9 @@ import pytest
 from hypothesis import Phase, assume, given, settings
 from numpy.typing import NDArray
 
-from supervessel import principal as module
 from supervessel import reference
 from supervessel.composite.inertia import from_upper_triangle, upper_triangle
+from supervessel.rotation import principal as module
 from supervessel.rotation.principal import TIE, principal, principal_forward, quaternion
 from support import EPS, random_rotation
 

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-from fmu_build.build import generate
+from fmu_build.generate.model import generate
 from orbiter.files import HUB, SCENARIO, TABLE
 from supervessel import SceneError, load_scene, parse_scene
 from supervessel.orbiter import ScenarioError, import_scenario

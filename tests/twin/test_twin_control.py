@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fmu_build.errors import BuildError
 from supervessel import Twin, reference
-from supervessel.twin import FUNCTIONS
+from supervessel.twin.twin import FUNCTIONS
 from support import EPS, ISS_DG, body, relative_error, scene, variant
 
 Array = NDArray[np.float64]
