@@ -77,8 +77,8 @@ def keep(place: Path, found: Any) -> None:
 
     Whatever else is in that place is removed. Raises TradeError if it cannot be written.
     """
-    if place.is_dir() and not place.is_symlink():
-        remove(place)
+    if os.path.lexists(place) and (place.is_symlink() or not place.is_file()):
+        remove(place)  # a link is not followed, a pipe not waited for
     write_whole(place, json.dumps({"sha256": _digest(place, found), "kept": found}).encode())
 
 

@@ -1,4 +1,4 @@
-"""Digests of what the FMUs of some thirty scenes are made of: a change of the code's structure must keep them.
+"""Digests of what the FMUs of some thirty scenes are made of, which a change of structure must keep.
 
 python tests/bench/witness.py > before.json; change; python tests/bench/witness.py --against before.json
 
