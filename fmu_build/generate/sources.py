@@ -36,8 +36,8 @@ PRELUDE = """\
 #pragma STDC FP_CONTRACT OFF
 #endif
 
-/* Stands first in functions that divide: nothing is divided that the C does not divide. Otherwise clang fills a vector
-   of two with one quotient and a zero by zero, which a host that traps floating-point exceptions does not survive. */
+/* Stands first in functions that divide: nothing is divided that the C does not divide. Otherwise clang fills
+   a vector of two with one quotient and a zero by zero, and a host that traps exceptions dies of it. */
 #if defined(__clang__)
 #define DIVIDES_ONLY_AS_WRITTEN _Pragma("clang fp exceptions(maytrap)")
 #else

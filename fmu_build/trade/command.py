@@ -35,8 +35,10 @@ def trade(options: argparse.Namespace) -> int:
             try:
                 files |= plot(found)
             except ImportError:
+                left = [name for name in ("trade.png", "trade.svg") if (folder / name).exists()]
+                earlier = f"; {' and '.join(left)} there are of an earlier trade" if left else ""
                 print(
-                    "no plot: matplotlib is not installed, pip install 'supervessel[plot]'", file=sys.stderr
+                    f"no plot: matplotlib is not installed (pip install matplotlib){earlier}", file=sys.stderr
                 )
             write_files({folder / f"trade.{kind}": content for kind, content in files.items()})
     except (SceneError, BuildError, OutputError) as error:
