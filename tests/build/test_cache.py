@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from fmu_build import cache as caches
-from fmu_build import temporary
 from fmu_build.compile.compiler import compile_library
 from fmu_build.errors import BuildError
 from fmu_build.flight.results import keep, place_of, read
 from fmu_build.platforms import host_platform
+from fmu_build.storage import cache as caches
+from fmu_build.storage import temporary
 from fmu_build.storage.cache import FULL, LARGEST, OURS, TAG, TAG_TEXT, USED, cache_folder, kept_sources
 from fmu_build.storage.temporary import temporary_folder
 from supervessel.__main__ import main

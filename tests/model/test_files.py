@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from supervessel import files
+from supervessel.shell import files
 from supervessel.shell.files import OutputError, check_output, made_folder, write_file, write_files
 
 ROOT = Path(files.__file__).parents[2]
