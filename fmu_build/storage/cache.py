@@ -27,6 +27,7 @@ from pathlib import Path
 from fmu_build.errors import BuildError
 from fmu_build.storage.temporary import folder_of_program, is_own, is_own_folder
 from supervessel.problems import printable
+from supervessel.shell.console import print_problem
 
 LAYOUT = 1
 """Version of what is where; counted up whenever that changes."""
@@ -380,7 +381,7 @@ def read_file(file: Path) -> bytes | None:
         if not stat.S_ISREG(status.st_mode) or status.st_size > LARGEST_FILE:
             return None
         with open(number, "rb", closefd=False) as stream:
-            return stream.read(LARGEST_FILE)
+            return stream.read(status.st_size)
     except OSError:
         return None
     finally:
@@ -396,6 +397,4 @@ def reason(error: OSError, purpose: str) -> str:
 @functools.cache
 def _say(message: str) -> None:
     """Prints a line on stderr, once."""
-    if sys.stderr is not None:
-        with suppress(OSError, ValueError):
-            print(message, file=sys.stderr)
+    print_problem(message)

@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import sys
 from pathlib import Path
 
 from fmu_build.errors import BuildError
@@ -12,7 +11,7 @@ from fmu_build.trade.table import plot, table
 from supervessel.loading import load_scene, parse_scene
 from supervessel.problems import SceneError, TradeError, printable
 from supervessel.scene.schema import Scene, without_accuracy
-from supervessel.shell.console import print_results, show_progress
+from supervessel.shell.console import print_problem, print_results, show_progress
 from supervessel.shell.ending import say
 from supervessel.shell.files import OutputError, check_output, made_folder, write_files
 
@@ -35,15 +34,13 @@ def trade(options: argparse.Namespace) -> int:
             try:
                 files |= plot(found)
             except ImportError:
-                print(
-                    "no plot: matplotlib is not installed, pip install 'supervessel[plot]'", file=sys.stderr
-                )
+                print_problem("no plot: matplotlib is not installed, pip install 'supervessel[plot]'")
             write_files({folder / f"trade.{kind}": content for kind, content in files.items()})
     except (SceneError, BuildError, OutputError) as error:
-        print(error, file=sys.stderr)
+        print_problem(error)
         return 1
     except TradeError as error:
-        print(f"{printable(options.scene.name)}: {error}", file=sys.stderr)
+        print_problem(f"{printable(options.scene.name)}: {error}")
         return 1
     return print_results(f"{tables}\n\n{folder}", f"the trade is written to {folder}, its tables")
 
