@@ -141,7 +141,7 @@ def run(
     shell: str = "",
     before: Sequence[str] = (),
     options: Sequence[str] = (),
-    folder: Path | None = None,
+    fresh: bool = False,
 ) -> Done:
     """Returns what came of a command.
 
@@ -150,15 +150,17 @@ def run(
     shell   : what a shell does first, in which "$@" is the command; none: nothing
     before  : a program, with its arguments, that runs the command
     options : of Python
-    folder  : to work in, by default that of the place
+    fresh   : whether a trade flies what has been flown in good surroundings
     """
+    if words == TRADE and not fresh and kept_in(place.cache).is_dir():
+        _give_flights(place)
     had = place.files()
     command = [*before, sys.executable, *options, "-m", *words]
     if shell:
         command = ["/bin/sh", "-c", shell, "sh", *command]
     done = subprocess.run(
         command,
-        cwd=folder or place.work,
+        cwd=place.work,
         env=environment(place, changes),
         stdin=subprocess.DEVNULL,
         capture_output=True,
@@ -167,6 +169,20 @@ def run(
     )
     made = {name: content for name, content in place.files().items() if had.get(name) != content}
     return Done(done.returncode, done.stdout.decode(), done.stderr.decode(), made)
+
+
+_flights: dict[str, bytes] = {}
+"""Files of a cache with what a trade in good surroundings has flown."""
+
+
+def _give_flights(place: Place) -> None:
+    """Has a cache keep what has been flown, unless it keeps something."""
+    clean(TRADE)
+    kept = kept_in(place.cache) / "trade"
+    if not kept.exists():
+        kept.mkdir()
+        for name, content in _flights.items():
+            (kept / name).write_bytes(content)
 
 
 def assert_clean(done: Done, place: Place) -> None:
@@ -183,7 +199,7 @@ def assert_right(done: Done, place: Place, words: Sequence[str] = BUILD, error: 
     assert_clean(done, place)
     assert (done.status, done.error) == (0, notes(tuple(words)) + error), done
     assert set(done.made) == MADE[tuple(words)]
-    if words is not TRADE:  # which tells times
+    if words != TRADE:  # which tells times
         assert done.made == clean(tuple(words)).made
     if words not in (TRADE, CACHE):
         assert done.out == clean(tuple(words)).out
@@ -228,6 +244,9 @@ def strangers() -> Iterator[Place]:
 def clean(words: tuple[str, ...]) -> Done:
     """Returns what came of a command in good surroundings."""
     with tempfile.TemporaryDirectory(prefix="supervessel-test-") as name:
-        done = run(words, place_in(Path(name)))
+        place = place_in(Path(name))
+        done = run(words, place, fresh=True)
+        if words == TRADE:
+            _flights.update({f.name: f.read_bytes() for f in (kept_in(place.cache) / "trade").iterdir()})
     assert done.status == 0, done.error
     return done
