@@ -3,7 +3,6 @@
 import hashlib
 import os
 import re
-import tempfile
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -14,7 +13,7 @@ from fmu_build.generate.change_tables import change_constants
 from fmu_build.generate.vessel_loop import Tables, loop_constants
 from fmu_build.interface.variable_table import TableEntry
 from fmu_build.storage.cache import reason
-from fmu_build.storage.temporary import temporary_folder
+from fmu_build.storage.temporary import place_for_temporary, temporary_folder
 from supervessel.equations import Equations
 from supervessel.problems import printable
 from supervessel.rotation.propagators.free_motion import FIRST_ANGLE, LARGEST_TURN
@@ -58,9 +57,9 @@ def generated(generator: ca.CodeGenerator, file: str) -> str:
             generator.generate(f"{folder}/")
             return (folder / file).read_text()
     except UnicodeDecodeError:
-        raise BuildError(f"{tempfile.gettempdir()!a}: must be UTF-8, to be worked in") from None
+        raise BuildError(f"{place_for_temporary()!a}: must be UTF-8, to be worked in") from None
     except (OSError, RuntimeError) as error:
-        where = f"{printable(str(tempfile.gettempdir()))}: C cannot be written there"
+        where = f"{printable(place_for_temporary())}: C cannot be written there"
         why = reason(error, "for it") if isinstance(error, OSError) else str(error)
         raise BuildError(f"{where}: {why}") from None
 

@@ -25,7 +25,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from fmu_build.errors import BuildError
-from fmu_build.storage.temporary import folder_of_program, is_own, is_own_folder
+from fmu_build.storage.temporary import folder_of_program, is_own, is_own_folder, place_for_temporary
 from supervessel.problems import printable
 from supervessel.shell.console import print_problem
 
@@ -118,9 +118,7 @@ def _temporary() -> Path:
         folder = folder_of_program()
         _refuse_for_compilers(folder)
     except OSError as error:
-        raise BuildError(
-            f"{printable(str(tempfile.gettempdir()))}: {reason(error, 'to compile in')}"
-        ) from None
+        raise BuildError(f"{printable(place_for_temporary())}: {reason(error, 'to compile in')}") from None
     except ValueError as why:
         raise BuildError(f"{printable(str(folder))}: {why}") from None
     return folder
