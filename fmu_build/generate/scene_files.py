@@ -1,5 +1,6 @@
 """C that is particular to a scene: the generated equations, the variable table and the scene's numbers."""
 
+import errno
 import hashlib
 import os
 import re
@@ -55,7 +56,10 @@ def generated(generator: ca.CodeGenerator, file: str) -> str:
         with temporary_folder() as folder:
             os.fsencode(folder).decode()  # CasADi drops what is no UTF-8, and writes elsewhere
             generator.generate(f"{folder}/")
-            return (folder / file).read_text()
+            text = (folder / file).read_text()
+            if generator.dump() not in text:  # CasADi does not notice that a disk is full
+                raise OSError(errno.ENOSPC, "it has not been written whole")
+            return text
     except UnicodeDecodeError:
         raise BuildError(f"{place_for_temporary()!a}: must be UTF-8, to be worked in") from None
     except (OSError, RuntimeError) as error:
