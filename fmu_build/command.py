@@ -1,7 +1,6 @@
 """The command python -m fmu_build SCENE.toml [-o OUT.fmu] [--fmi 2|3] [--platform NAME ...|all]."""
 
 import argparse
-import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from fmu_build.platforms import PLATFORMS, Platform, platforms_named
 from supervessel.problems import printable
-from supervessel.shell.console import Parser, print_results, show_progress
+from supervessel.shell.console import Parser, print_problem, print_results, show_progress
 from supervessel.shell.ending import say
 
 if TYPE_CHECKING:
@@ -61,10 +60,10 @@ def _build(options: argparse.Namespace, platforms: Sequence[Platform]) -> int:
         chosen = _choose(scene) if scene.accuracy else []
         build_fmu(scene, output, options.fmi, platforms)
     except (SceneError, BuildError) as error:
-        print(error, file=sys.stderr)
+        print_problem(error)
         return 1
     except TradeError as error:
-        print(f"{printable(options.scene.name)}: {error}", file=sys.stderr)
+        print_problem(f"{printable(options.scene.name)}: {error}")
         return 1
     return print_results("\n".join([*chosen, str(output)]), "the FMU is built, its path")
 

@@ -1,6 +1,7 @@
 #include "changes.h"
 
 #include <float.h>
+#include <locale.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -77,12 +78,34 @@ void instance_reset(Instance *instance) {
     instance_start_attitude(instance);
 }
 
+static bool is_digit(char c) {
+    return c >= '0' && c <= '9';
+}
+
+/* Puts points into numbers, in place of the mark that the host's locale has there: "(1,5, 2)" could be three numbers.
+   In brackets are indices, which have commas of their own. */
+static void put_points(char *message) {
+    const char *mark = localeconv()->decimal_point;
+    const size_t length = strlen(mark);
+    bool index = false;
+    size_t written = 0;
+    for (size_t read = 0; message[read];) {
+        index = message[read] == '[' || (index && message[read] != ']');
+        const bool point = !index && length > 0 && read > 0 && is_digit(message[read - 1]) &&
+                           strncmp(message + read, mark, length) == 0 && is_digit(message[read + length]);
+        message[written++] = point ? '.' : message[read];
+        read += point ? length : 1;
+    }
+    message[written] = '\0';
+}
+
 static void write_message(Instance *instance, Status status, LogCategory category, const char *format,
                           va_list arguments) {
     if (!(instance->log_categories & (unsigned)category)) return;
     char message[MESSAGE_SIZE];
     const int prefix = snprintf(message, sizeof message, "%s: ", instance->call->name);
     vsnprintf(message + prefix, sizeof message - (size_t)prefix, format, arguments);
+    put_points(message);
     const char *name = "";
     for (size_t i = 0; i < LOG_CATEGORY_COUNT; i++)
         if (LOG_CATEGORIES[i].categories == (unsigned)category) name = LOG_CATEGORIES[i].name;

@@ -1,6 +1,5 @@
 """Libraries of choices, and of the host that flies them, built in a folder for as long as they are needed."""
 
-import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from fmu_build.generate.model import generate
 from fmu_build.generate.sources import source_file_names, source_files
 from fmu_build.platforms import host_platform
 from fmu_build.storage.cache import reason
-from fmu_build.storage.temporary import temporary_folder
+from fmu_build.storage.temporary import place_for_temporary, temporary_folder
 from supervessel.equations import Equations, equations
 from supervessel.problems import TradeError, printable
 from supervessel.scene.schema import Scene
@@ -55,7 +54,7 @@ def workshop(*, trial: bool = False) -> Iterator[Workshop]:
         with temporary_folder() as folder:
             yield Workshop(folder, {}, trial)
     except OSError as error:
-        place = error.filename or tempfile.gettempdir()
+        place = error.filename or place_for_temporary()
         raise TradeError(f"{printable(str(place))}: {reason(error, 'to work in')}") from None
 
 

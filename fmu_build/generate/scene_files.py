@@ -1,9 +1,9 @@
 """C that is particular to a scene: the generated equations, the variable table and the scene's numbers."""
 
+import errno
 import hashlib
 import os
 import re
-import tempfile
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -14,7 +14,7 @@ from fmu_build.generate.change_tables import change_constants
 from fmu_build.generate.vessel_loop import Tables, loop_constants
 from fmu_build.interface.variable_table import TableEntry
 from fmu_build.storage.cache import reason
-from fmu_build.storage.temporary import temporary_folder
+from fmu_build.storage.temporary import place_for_temporary, temporary_folder
 from supervessel.equations import Equations
 from supervessel.problems import printable
 from supervessel.rotation.propagators.free_motion import FIRST_ANGLE, LARGEST_TURN
@@ -67,11 +67,14 @@ def generated(generator: ca.CodeGenerator, file: str) -> str:
         with temporary_folder() as folder:
             os.fsencode(folder).decode()  # CasADi drops what is no UTF-8, and writes elsewhere
             generator.generate(f"{folder}/")
-            return (folder / file).read_text()
+            text = (folder / file).read_text()
+            if generator.dump() not in text:  # CasADi does not notice that a disk is full
+                raise OSError(errno.ENOSPC, "it has not been written whole")
+            return text
     except UnicodeDecodeError:
-        raise BuildError(f"{tempfile.gettempdir()!a}: must be UTF-8, to be worked in") from None
+        raise BuildError(f"{place_for_temporary()!a}: must be UTF-8, to be worked in") from None
     except (OSError, RuntimeError) as error:
-        where = f"{printable(str(tempfile.gettempdir()))}: C cannot be written there"
+        where = f"{printable(place_for_temporary())}: C cannot be written there"
         why = reason(error, "for it") if isinstance(error, OSError) else str(error)
         raise BuildError(f"{where}: {why}") from None
 

@@ -25,8 +25,9 @@ from hashlib import sha256
 from pathlib import Path
 
 from fmu_build.errors import BuildError
-from fmu_build.storage.temporary import folder_of_program, is_own, is_own_folder
+from fmu_build.storage.temporary import folder_of_program, is_own, is_own_folder, place_for_temporary
 from supervessel.problems import printable
+from supervessel.shell.console import print_problem
 
 LAYOUT = 1
 """Version of what is where; counted up whenever that changes."""
@@ -117,9 +118,7 @@ def _temporary() -> Path:
         folder = folder_of_program()
         _refuse_for_compilers(folder)
     except OSError as error:
-        raise BuildError(
-            f"{printable(str(tempfile.gettempdir()))}: {reason(error, 'to compile in')}"
-        ) from None
+        raise BuildError(f"{printable(place_for_temporary())}: {reason(error, 'to compile in')}") from None
     except ValueError as why:
         raise BuildError(f"{printable(str(folder))}: {why}") from None
     return folder
@@ -380,7 +379,7 @@ def read_file(file: Path) -> bytes | None:
         if not stat.S_ISREG(status.st_mode) or status.st_size > LARGEST_FILE:
             return None
         with open(number, "rb", closefd=False) as stream:
-            return stream.read(LARGEST_FILE)
+            return stream.read(status.st_size)
     except OSError:
         return None
     finally:
@@ -396,6 +395,4 @@ def reason(error: OSError, purpose: str) -> str:
 @functools.cache
 def _say(message: str) -> None:
     """Prints a line on stderr, once."""
-    if sys.stderr is not None:
-        with suppress(OSError, ValueError):
-            print(message, file=sys.stderr)
+    print_problem(message)

@@ -2,8 +2,8 @@
 
 import argparse
 import re
-import sys
-from datetime import datetime
+from contextlib import suppress
+from datetime import UTC, datetime
 from pathlib import Path
 
 from fmu_build.errors import BuildError
@@ -22,7 +22,7 @@ from fmu_build.storage.cache import (
 )
 from fmu_build.storage.temporary import is_own_folder
 from supervessel.problems import printable
-from supervessel.shell.console import print_results
+from supervessel.shell.console import print_problem, print_results
 
 
 def cache(options: argparse.Namespace) -> int:
@@ -30,7 +30,7 @@ def cache(options: argparse.Namespace) -> int:
     try:
         said = clear() if options.clear else report()
     except BuildError as error:
-        print(error, file=sys.stderr)
+        print_problem(error)
         return 1
     return print_results(said, "the cache's content")
 
@@ -91,8 +91,19 @@ def _line(generation: Path) -> str:
         return f"{generation.name}: no folder of the user's own, left alone"
     used = generation / USED
     last = (used if used.exists() else generation).lstat().st_mtime
-    when = datetime.fromtimestamp(last).astimezone().isoformat(" ", "minutes")
-    return f"{generation.name}: {_size(size_of(generation))}, last used {when}"
+    return f"{generation.name}: {_size(size_of(generation))}, last used {_date(last)}"
+
+
+def _date(seconds: float) -> str:
+    """Returns a date for reading, from seconds since 1970.
+
+    It is of the local time zone, of UTC where Python cannot use that; a date that Python does not know is
+    told in seconds.
+    """
+    for zone in (None, UTC):
+        with suppress(ValueError, OverflowError, OSError):
+            return datetime.fromtimestamp(seconds, UTC).astimezone(zone).isoformat(" ", "minutes")
+    return f"{seconds:.0f} s after 1970"
 
 
 def _size(count: float) -> str:

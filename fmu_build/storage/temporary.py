@@ -54,6 +54,13 @@ def temporary_folder() -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
+def place_for_temporary() -> str:
+    """Returns the folder for temporary files as messages name it; where none can be used, its variable."""
+    with suppress(OSError):
+        return tempfile.gettempdir()
+    return "TMPDIR"
+
+
 @functools.cache
 def folder_of_program() -> Path:
     """Returns a temporary folder that is removed when the program ends."""

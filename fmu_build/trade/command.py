@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import sys
 from pathlib import Path
 
 from fmu_build.errors import BuildError
@@ -12,7 +11,7 @@ from fmu_build.trade.table import plot, table
 from supervessel.loading import load_scene, parse_scene
 from supervessel.problems import SceneError, TradeError, printable
 from supervessel.scene.schema import Scene, without_accuracy
-from supervessel.shell.console import print_results, show_progress
+from supervessel.shell.console import print_problem, print_results, show_progress
 from supervessel.shell.ending import say
 from supervessel.shell.files import OutputError, check_output, made_folder, write_files
 
@@ -37,15 +36,13 @@ def trade(options: argparse.Namespace) -> int:
             except ImportError:
                 left = [name for name in ("trade.png", "trade.svg") if (folder / name).exists()]
                 earlier = f"; {' and '.join(left)} there are of an earlier trade" if left else ""
-                print(
-                    f"no plot: matplotlib is not installed (pip install matplotlib){earlier}", file=sys.stderr
-                )
+                print_problem(f"no plot: matplotlib is not installed (pip install matplotlib){earlier}")
             write_files({folder / f"trade.{kind}": content for kind, content in files.items()})
     except (SceneError, BuildError, OutputError) as error:
-        print(error, file=sys.stderr)
+        print_problem(error)
         return 1
     except TradeError as error:
-        print(f"{printable(options.scene.name)}: {error}", file=sys.stderr)
+        print_problem(f"{printable(options.scene.name)}: {error}")
         return 1
     return print_results(f"{tables}\n\n{folder}", f"the trade is written to {folder}, its tables")
 

@@ -6,7 +6,6 @@ supervessel cache [--clear]
 """
 
 import argparse
-import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -16,7 +15,7 @@ from supervessel import fmu
 from supervessel.orbiter import ScenarioError, import_scenario
 from supervessel.problems import first
 from supervessel.scene.schema import Convention
-from supervessel.shell.console import Parser, print_results
+from supervessel.shell.console import Parser, print_problem, print_results
 from supervessel.shell.files import OutputError, check_output, write_file
 
 
@@ -77,10 +76,10 @@ def _import(options: argparse.Namespace) -> int:
         )
         check_output(output, made.sources)
         for note in first(made.notes, "notes, all of them at the head of the scene"):
-            print(f"note: {note}", file=sys.stderr)
+            print_problem(f"note: {note}")
         write_file(output, made.text.encode())
     except (ScenarioError, OutputError) as error:
-        print(error, file=sys.stderr)
+        print_problem(error)
         return 1
     return print_results(str(output), "the scene is written, its path")
 

@@ -4,16 +4,29 @@ import argparse
 import os
 import shutil
 import sys
-from typing import NoReturn
+from contextlib import suppress
+from typing import NoReturn, Protocol
 
 from supervessel.problems import LONGEST_PROBLEM, printable
 
 
+class _Writable(Protocol):
+    """What argparse prints to."""
+
+    def write(self, text: str, /) -> object: ...
+
+
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors show arguments as they can be printed."""
+    """A parser whose errors show arguments as they can be printed; help that cannot be is an error."""
 
     def error(self, message: str) -> NoReturn:
         super().error(printable(message, LONGEST_PROBLEM))
+
+    def _print_message(self, message: str, file: "_Writable | None" = None) -> None:
+        if file is not sys.stdout:
+            super()._print_message(message, file)
+        elif print_results(message.rstrip("\n"), "the help"):
+            self.exit(1)
 
 
 def print_results(text: str, what: str) -> int:
@@ -29,10 +42,17 @@ def print_results(text: str, what: str) -> int:
     try:
         print(text, flush=True)
     except (OSError, UnicodeError) as error:
-        print(f"{printable(what)} cannot be printed: {printable(str(error))}", file=sys.stderr)
+        print_problem(f"{printable(what)} cannot be printed: {printable(str(error))}")
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left is flushed at the end
         return 1
     return 0
+
+
+def print_problem(text: object) -> None:
+    """Prints lines on standard error; where it takes none, only the exit status tells what has happened."""
+    if sys.stderr is not None:
+        with suppress(OSError, ValueError):
+            print(text, file=sys.stderr, flush=True)
 
 
 def show_progress(text: str, end: str = "") -> None:

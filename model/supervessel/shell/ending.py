@@ -8,6 +8,7 @@ steps of the interpreter, so that a single call of a C library delays it, 0.15 s
 What this module imports is there before a handler is: nothing that takes time.
 """
 
+import errno
 import os
 import signal
 import sys
@@ -50,9 +51,16 @@ def run_as_process(main: Callable[[], int]) -> int:
         signal.signal(number, tell)
     try:
         return main()
+    except Exception as error:
+        missing = _missing(error)
+        if not missing:
+            raise
+        _quietly(os.write, 2, f"the system gives this command no more {missing}\n".encode())
+        return 1
     finally:
         for number in handled:
             signal.signal(number, signal.SIG_IGN)
+        _flush_errors()
 
 
 def tell(number: int, _frame: object) -> None:
@@ -133,6 +141,31 @@ def _quietly(act: Callable[..., object], *arguments: object) -> None:
         act(*arguments)
 
 
+def _missing(error: BaseException | None) -> str:
+    """Returns what the system has refused, if that is behind an error; else nothing."""
+    numbers = {errno.EMFILE: "open files", errno.ENFILE: "open files"}
+    numbers |= {errno.ENOMEM: "memory", errno.EAGAIN: "processes"}
+    words = {"new thread": "processes", "map segment": "memory", "allocate memory": "memory"}
+    while error is not None:
+        if isinstance(error, MemoryError):
+            return "memory"
+        if isinstance(error, OSError) and error.errno in numbers:
+            return numbers[error.errno]
+        for part, missing in words.items():  # of threads, and of libraries that are loaded
+            if isinstance(error, RuntimeError | ImportError) and part in str(error):
+                return missing
+        error = error.__cause__ or error.__context__
+    return ""
+
+
+def _flush_errors() -> None:
+    """Drops what standard error has not taken: at its end Python would make another exit status of that."""
+    try:
+        sys.stderr.flush()
+    except (OSError, ValueError):
+        _quietly(os.dup2, os.open(os.devnull, os.O_WRONLY), 2)
+
+
 def _open_streams() -> None:
     """Opens what is closed of standard input, output and error: nothing else gets their numbers."""
     for number in range(3):
@@ -141,6 +174,6 @@ def _open_streams() -> None:
         except OSError:
             os.open(os.devnull, os.O_RDWR)  # it gets the lowest number that is free
     if sys.stdout is None:
-        sys.stdout = open(1, "w", encoding="utf-8")  # noqa: SIM115
+        sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
     if sys.stderr is None:
-        sys.stderr = open(2, "w", encoding="utf-8")  # noqa: SIM115
+        sys.stderr = open(2, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
