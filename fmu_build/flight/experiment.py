@@ -20,7 +20,7 @@ SAMPLES = 100
 """Communication points up to each horizon at which a flight is looked at."""
 
 HORIZONS = (100.0, 10.0, 1.0)
-"""What the duration is divided by for the times up to which errors are given."""
+"""What the duration is divided by for the times up to which errors are given, each at the end of a step."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,13 @@ class Course:
 
     @property
     def horizons(self) -> list[float]:
-        """Times [s] up to which errors are given."""
-        return [self.duration / part for part in HORIZONS]
+        """Times [s] up to which errors are given: communication points."""
+        return [self.duration if end == self.steps else end * self.size for end in _ends(self.steps)]
+
+
+def _ends(steps: int) -> list[int]:
+    """Returns the numbers of the steps after which errors are given, ascending."""
+    return sorted({ceil(steps / part - SLACK) for part in HORIZONS})
 
 
 def experiment_of(scene: Scene) -> Experiment:
@@ -78,7 +83,7 @@ def course_of(scene: Scene) -> Course:
     docks = {name for name, kind in by_name(dict(scene.inputs)).items() if kind.boolean}
     moving = {name: rows for name, rows in experiment.inputs.items() if name not in docks}
     switched = {name: rows for name, rows in experiment.inputs.items() if name in docks}
-    sampled: set[int] = set()
+    sampled = set(_ends(steps))
     for part in HORIZONS:
         sampled.update(np.rint(np.linspace(0.0, steps / part, SAMPLES + 1)).astype(int).tolist())
     return Course(

@@ -955,7 +955,8 @@ ALLOWED = "must be a number from 1e-15 to 0.1"
     [
         (
             {"rotation": {"propagator": "split", "law": "none"}},
-            'rotation.propagator = "split": must be "exact" for rotation.law = "none": torque does nothing',
+            'rotation.propagator = "split": makes no sense with rotation.law = "none", where torque does '
+            "nothing; take any other",
         ),
         (
             {"rotation": {"propagator": "split"}, "inputs.torque": False},

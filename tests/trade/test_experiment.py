@@ -148,3 +148,11 @@ def test_what_is_frozen_keeps_its_value_at_the_start_and_is_no_input():
     still = variant_of(scene, Choice(Model("tensor", "pose"), "taylor"))
     assert still.port("DG.nose").position == (0.0, -0.5, -10.076)
     assert (still.inputs.mass, still.inputs.pose) == (("DG",), ())
+
+
+def test_errors_are_given_at_communication_points():
+    """A hundredth of one second is before the first step of 0.1 s: no error can be told there."""
+    raw = variant(moved({}), {"experiment.duration": 1.0, "experiment.step": 0.1})
+    course = course_of(parse_scene(raw))
+    assert course.horizons == pytest.approx([0.1, 1.0])
+    assert {1, 10} <= set(course.sampled.tolist())

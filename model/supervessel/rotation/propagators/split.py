@@ -32,7 +32,7 @@ def build(motion: StepSymbols) -> Step:
 def _suits(law: str, inputs: Mapping[str, Any]) -> str:
     """Returns why kicks make no sense: without a torque, and where parts move."""
     if law == "none":
-        return 'must be "exact" for rotation.law = "none": torque does nothing'
+        return 'makes no sense with rotation.law = "none", where torque does nothing; take any other'
     if inputs.get("motion"):
         return STILL_PARTS
     if not acting(inputs):
