@@ -11,7 +11,15 @@ from pathlib import Path
 from fmu_build.compile.universal import universal_library
 from fmu_build.errors import BuildError
 from fmu_build.platforms import PLATFORMS, Platform, library_contents
-from fmu_build.storage.cache import cache_folder, count_compilation, reason
+from fmu_build.storage.cache import (
+    cache_folder,
+    count_compilation,
+    in_use,
+    keep_library,
+    place_of_library,
+    read_library,
+    reason,
+)
 from supervessel.problems import printable
 from supervessel.shell.processes import Workers, run
 
@@ -43,16 +51,19 @@ def compile_binaries(  # noqa: PLR0913, PLR0917
     fmi: int,
     model_identifier: str,
     flags: Sequence[str] = FLAGS,
+    content: bytes = b"",
 ) -> dict[str, bytes]:
     """Compiles an FMU's library for each platform and returns the libraries by archive path, binaries/...
 
     sources : C files, relative to `folder`, their headers beside them
     folder  : where they lie
+    content : stands for all that is in the folder: what has been made of the same content is kept and not
+              compiled again; empty: nothing is kept
     Raises BuildError with the compiler's own words for each platform where it fails.
     """
     contents = library_contents(platforms, fmi)
     needed = [platform for platform in PLATFORMS if any(platform in parts for parts in contents.values())]
-    thin = _thin_libraries(sources, folder, needed, model_identifier, flags)
+    thin = _thin_libraries(sources, folder, needed, model_identifier, flags, content)
     libraries = {}
     for name, parts in contents.items():
         path = f"binaries/{name}/{model_identifier}{parts[0].suffix}"
@@ -61,18 +72,25 @@ def compile_binaries(  # noqa: PLR0913, PLR0917
     return libraries
 
 
-def _thin_libraries(
+def _thin_libraries(  # noqa: PLR0913, PLR0917
     sources: Sequence[str],
     folder: Path,
     platforms: Sequence[Platform],
     model_identifier: str,
     flags: Sequence[str],
+    content: bytes,
 ) -> dict[Platform, bytes]:
     """Returns the library of each platform; those that fail are all named in one BuildError."""
 
     def compiled(platform: Platform) -> bytes:
         name = f"{model_identifier}{platform.suffix}"
-        return _compiled([Path(source) for source in sources], platform, name, flags, folder)
+        place = _place_of_library(content, platform, name, flags) if content else None
+        library = read_library(place) if place else None
+        if library is None:
+            library = _compiled([Path(source) for source in sources], platform, name, flags, folder)
+            if place:
+                keep_library(place, library)
+        return library
 
     libraries, problems = {}, []
     with Workers(AT_ONCE) as pool:
@@ -84,6 +102,13 @@ def _thin_libraries(
     if problems:
         raise BuildError("\n".join(problems))
     return libraries
+
+
+def _place_of_library(content: bytes, platform: Platform, name: str, flags: Sequence[str]) -> Path:
+    """Returns where a library is kept: under all that it depends on."""
+    return place_of_library(
+        repr([content, platform.target, name, *flags, str(compiler()), compiler().stat().st_size]).encode()
+    )
 
 
 def compile_library(
@@ -122,12 +147,12 @@ def _compiled(
     if platform.suffix == ".dylib":
         command.append(f"-Wl,-install_name,@rpath/{name}")
     try:
-        with tempfile.TemporaryDirectory(dir=cache, prefix="made-") as made:
+        with in_use(cache), tempfile.TemporaryDirectory(dir=cache, prefix="made-") as made:
             output = Path(made, name)
             command += ["-isystem", str(fmi_headers()), "-o", str(output), *map(str, sources)]
             if platform.suffix == ".so":
                 command.append("-lm")
-            problem = _run(command, folder, cache)
+            problem = _run(command, folder, cache, Path(made, "objects"))
             count_compilation(cache)
             if problem is not None:
                 raise BuildError(f"compiler for {platform.name} {problem}")
@@ -137,11 +162,15 @@ def _compiled(
         raise BuildError(f"{printable(str(place))}: {reason(error, 'to compile in')}") from None
 
 
-def _run(command: Sequence[str], folder: Path | None, cache: Path) -> str | None:
-    """Runs the compiler and returns what it did instead of compiling, if so."""
+def _run(command: Sequence[str], folder: Path | None, cache: Path, objects: Path) -> str | None:
+    """Runs the compiler and returns what it did instead of compiling, if so.
+
+    objects : folder for what is compiled from our sources: always made anew, since the compiler believes
+              whatever it finds there
+    """
     kept_in = f"The compiler's cache is {printable(str(cache))}; `supervessel cache --clear` removes it"
     try:
-        done = run(command, TIME_LIMIT, folder, environment(cache))
+        done = run(command, TIME_LIMIT, folder, environment(cache, objects))
     except subprocess.TimeoutExpired:
         return f"did not end within {TIME_LIMIT:g} s.\n{kept_in}"
     if done.returncode == 0:
@@ -149,9 +178,9 @@ def _run(command: Sequence[str], folder: Path | None, cache: Path) -> str | None
     return f"failed:\n{(done.stderr or done.stdout).strip()}\n{kept_in}"
 
 
-def environment(cache: Path) -> dict[str, str]:
+def environment(cache: Path, objects: Path) -> dict[str, str]:
     """Returns all the variables that a compiler gets: its result depends on no other."""
-    kept = {"ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": str(cache)}
+    kept = {"ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": str(objects)}
     return kept | {name: os.environ[name] for name in NEEDED if name in os.environ}
 
 

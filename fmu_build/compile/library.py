@@ -34,4 +34,4 @@ def compile_sources(  # noqa: PLR0913, PLR0917
     except OSError as error:
         place = error.filename or cache_folder()
         raise BuildError(f"{printable(str(place))}: {reason(error, 'to compile in')}") from None
-    return compile_binaries([WHOLE], folder, platforms, fmi, identifier, flags)
+    return compile_binaries([WHOLE], folder, platforms, fmi, identifier, flags, folder.name.encode())

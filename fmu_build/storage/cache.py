@@ -20,12 +20,18 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 
 from fmu_build.errors import BuildError
-from fmu_build.storage.temporary import folder_of_program, is_own, is_own_folder, place_for_temporary
+from fmu_build.storage.temporary import (
+    folder_of_program,
+    is_own,
+    is_own_folder,
+    lock,
+    place_for_temporary,
+)
 from supervessel.problems import printable
 from supervessel.shell.console import print_problem
 
@@ -54,8 +60,9 @@ UNUSED = 3600.0
 LARGEST_FILE = 64 << 20
 """Bytes; no file that is kept to be read again is as large."""
 
-USED, FULL = "used", "full"
-"""Files in a generation: a byte for each compilation, as old as the last use; there once it is too large."""
+USED, FULL, LOCK = "used", "full", "lock"
+"""Files in a generation: a byte for each compilation, as old as the last use; there once it is too large;
+locked, shared, while a compiler works."""
 
 FULL_DISK = (
     errno.ENOSPC,
@@ -173,7 +180,8 @@ def trust(ours: Path) -> None:
     if not is_own(status):
         raise UntrustedError(f"{printable(str(ours))} belongs to another user")
     if os.name == "posix" and status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        raise UntrustedError(f"others may write {printable(str(ours))} (chmod go-w lets it be used)")
+        changed = "and may have changed what is in it; remove it, and another is made"
+        raise UntrustedError(f"others may write {printable(str(ours))} {changed}")
     if read_file(ours / TAG) != TAG_TEXT:
         raise UntrustedError(
             f"{printable(str(ours))} has not been made by supervessel, its {TAG} is another or missing"
@@ -188,15 +196,24 @@ def trust_around(base: Path) -> None:
     """
     if os.name != "posix":
         return
-    if base.stat().st_uid not in (0, os.geteuid()):
-        raise UntrustedError(f"{printable(str(base))} belongs to another user")
     for folder in (base, *base.parents):
         status = folder.stat()
+        if status.st_uid not in (0, os.geteuid(), _unknown_user()):
+            raise UntrustedError(f"{printable(str(folder))} belongs to another user")
         others = status.st_mode & stat.S_IWOTH or (
             status.st_mode & stat.S_IWGRP and not _is_own_group(status.st_gid)
         )
         if others and not status.st_mode & stat.S_ISVTX:
             raise UntrustedError(f"others may write {printable(str(folder))}, and so replace what is in it")
+
+
+@functools.cache
+def _unknown_user() -> int:
+    """Returns the number of all users from outside of a container, who may own the folders above it."""
+    try:
+        return int(Path("/proc/sys/kernel/overflowuid").read_text())
+    except (OSError, ValueError):
+        return 0
 
 
 def _is_own_group(group: int) -> bool:
@@ -219,7 +236,7 @@ def _generation(ours: Path) -> Path:
     numbers = generation_numbers(ours)
     newest = max(numbers, default=0)
     folder = ours / f"generation-{newest}"
-    if not is_own_folder(folder) or os.path.lexists(folder / FULL):
+    if not _is_private(folder) or os.path.lexists(folder / FULL):
         folder = ours / f"generation-{newest + 1}"
         folder.mkdir(0o700, exist_ok=True)
     _touch(folder / USED)
@@ -230,9 +247,47 @@ def _generation(ours: Path) -> Path:
     return folder
 
 
+def _is_private(folder: Path) -> bool:
+    """Whether a folder is the user's own, and nobody else can reach what is in it."""
+    return is_own_folder(folder) and (os.name != "posix" or not folder.lstat().st_mode & 0o077)
+
+
+@contextmanager
+def in_use(generation: Path) -> Iterator[None]:
+    """Has a generation known as in use while a compiler works in it: it is then not cleared."""
+    file = open_lock(generation / LOCK)
+    if file is None:  # it goes on without
+        yield
+        return
+    try:
+        lock(file, shared=True)
+        yield
+    finally:
+        os.close(file)
+
+
+def is_in_use(generation: Path) -> bool:
+    """Whether a compiler works in a generation."""
+    file = open_lock(generation / LOCK)
+    if file is None:
+        return False
+    try:
+        return not lock(file)
+    finally:
+        os.close(file)
+
+
+def open_lock(file: Path) -> int | None:
+    """Returns a file that is opened to be locked, made if need be; None where it cannot be."""
+    try:
+        return os.open(file, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)
+    except OSError:
+        return None
+
+
 def generation_numbers(ours: Path) -> list[int]:
     """Returns the numbers of the generations that are there, whatever has such a name."""
-    found = (re.fullmatch(r"generation-(\d{1,9})", name) for name in os.listdir(ours))  # noqa: PTH208
+    found = (re.fullmatch(r"generation-(\d{1,18})", name) for name in os.listdir(ours))  # noqa: PTH208
     return [int(match[1]) for match in found if match]
 
 
@@ -326,7 +381,7 @@ def kept_sources(files: Mapping[str, bytes]) -> Path:
 def _folder_for(kind: str) -> Path:
     """Returns a folder in the generation in use, for things of a kind; what is in its place is removed."""
     folder = cache_folder() / kind
-    if not folder.is_dir():
+    if not is_own_folder(folder):
         remove(folder)
         folder.mkdir(0o700, exist_ok=True)
     return folder
@@ -360,6 +415,31 @@ def place_of_result(kind: str, question: bytes) -> Path:
     question : all that the answer depends on
     """
     return _folder_for(kind) / f"{sha256(question).hexdigest()}.json"
+
+
+def place_of_library(question: bytes) -> Path:
+    """Returns the file in which the library is kept that answers a question."""
+    return _folder_for("libraries") / sha256(question).hexdigest()
+
+
+def keep_library(place: Path, library: bytes) -> None:
+    """Keeps a library behind its digest; where that cannot be written nothing is kept."""
+    with suppress(OSError), tempfile.NamedTemporaryFile(dir=place.parent, delete=False) as part:
+        try:
+            part.write(sha256(library).digest() + library)
+            part.close()
+            remove(place)
+            Path(part.name).replace(place)
+        except OSError:
+            Path(part.name).unlink()
+            raise
+
+
+def read_library(place: Path) -> bytes | None:
+    """Returns the library that is kept in a place, None where there is none, or one that has been changed."""
+    whole = read_file(place) or b""
+    library = whole[32:]
+    return library if library and sha256(library).digest() == whole[:32] else None
 
 
 def read_file(file: Path) -> bytes | None:

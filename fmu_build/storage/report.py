@@ -2,6 +2,7 @@
 
 import argparse
 import re
+import secrets
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
@@ -10,11 +11,13 @@ from fmu_build.errors import BuildError
 from fmu_build.storage.cache import (
     LARGEST,
     OURS,
+    TAG,
     UNUSED,
     USED,
     UntrustedError,
     base_folder,
     generation_numbers,
+    is_in_use,
     remove,
     size_of,
     trust,
@@ -23,6 +26,12 @@ from fmu_build.storage.cache import (
 from fmu_build.storage.temporary import is_own_folder
 from supervessel.problems import printable
 from supervessel.shell.console import print_problem, print_results
+
+NAME = re.compile(r"supervessel-\d+")
+"""Of a cache, of whatever layout."""
+
+GOING = ".supervessel-going-"
+"""How the name of a cache begins that is being removed."""
 
 
 def cache(options: argparse.Namespace) -> int:
@@ -67,22 +76,54 @@ def clear() -> str:
     Raises BuildError where something could not be removed.
     """
     _, base = base_folder()
-    found = sorted(base.glob("supervessel-*")) if base is not None and base.is_dir() else []
-    lines = []
-    for folder in found:
-        if not re.fullmatch(r"supervessel-\d+", folder.name):
-            continue
+    if base is None or not base.is_dir():
+        return f"nothing to remove: {printable(str(base or 'no cache'))}"
+    try:
+        trust_around(base)
+    except UntrustedError as why:
+        return f"left: {why}"
+    found = [folder for folder in sorted(base.glob("supervessel-*")) if NAME.fullmatch(folder.name)]
+    lines = [_cleared(folder) for folder in found]
+    for left in base.glob(f"{GOING}*"):  # of a clear that was killed
+        with suppress(UntrustedError):
+            trust(left)
+            _remove(left)
+    return "\n".join(lines) or f"nothing to remove: {printable(str(base / OURS))}"
+
+
+def _cleared(folder: Path) -> str:
+    """Removes a cache and says so, or why it has been left.
+
+    It gets another name first: it is gone at once, whatever ends the removing, and what was judged is what
+    is removed.
+    """
+    try:
+        trust(folder)
+        for number in generation_numbers(folder):
+            if is_in_use(folder / f"generation-{number}"):
+                return f"left: {printable(str(folder))} is in use by a build"
+        going = folder.with_name(f"{GOING}{secrets.token_hex(8)}")
+        folder.rename(going)
         try:
-            trust(folder)
-        except UntrustedError as why:
-            lines.append(f"left: {why}")
-            continue
-        size = size_of(folder)
-        remove(folder)
-        if folder.exists():
-            raise BuildError(f"{printable(str(folder))}: could not be removed whole")
-        lines.append(f"removed: {printable(str(folder))}, {_size(size)}")
-    return "\n".join(lines) or f"nothing to remove: {printable(str(base or 'no cache'))}"
+            trust(going)
+        except UntrustedError:
+            going.rename(folder)
+            raise
+    except UntrustedError as why:
+        return f"left: {why}"
+    size = size_of(going)
+    _remove(going)
+    return f"removed: {printable(str(folder))}, {_size(size)}"
+
+
+def _remove(folder: Path) -> None:
+    """Removes a folder that is on its way, its tag last."""
+    for path in folder.iterdir():
+        if path.name != TAG:
+            remove(path)
+    remove(folder)
+    if folder.exists():
+        raise BuildError(f"{printable(str(folder))}: could not be removed whole")
 
 
 def _line(generation: Path) -> str:

@@ -39,18 +39,17 @@ def temporary_folder() -> Iterator[Path]:
     """
     clear_left(tempfile.gettempdir())
     folder = Path(tempfile.mkdtemp(prefix=PREFIX))
-    lock = None
+    held = None
     try:
-        lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
-        if _lock(
-            lock
-        ):  # without locks, as on some network drives, the folder is never taken for a killed run's
-            os.lseek(lock, 0, os.SEEK_SET)
-            os.write(lock, SIGNATURE)
+        held = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
+        # without locks, as on some network drives, the folder is never taken for that of a killed run
+        if lock(held):
+            os.lseek(held, 0, os.SEEK_SET)
+            os.write(held, SIGNATURE)
         yield folder
     finally:
-        if lock is not None:
-            os.close(lock)  # Windows removes no open file
+        if held is not None:
+            os.close(held)  # Windows removes no open file
         shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -87,16 +86,16 @@ def _clear(folder: Path) -> None:
     """Removes a folder if it is left over. Raises OSError where that cannot be found out."""
     if not is_own_folder(folder):
         return
-    lock = os.open(folder / LOCK, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
+    held = os.open(folder / LOCK, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
     try:
-        status = os.fstat(lock)
-        if not stat.S_ISREG(status.st_mode) or not is_own(status) or not _lock(lock):
+        status = os.fstat(held)
+        if not stat.S_ISREG(status.st_mode) or not is_own(status) or not lock(held):
             return
-        os.lseek(lock, 0, os.SEEK_SET)
-        if os.read(lock, len(SIGNATURE) + 1) != SIGNATURE:
+        os.lseek(held, 0, os.SEEK_SET)
+        if os.read(held, len(SIGNATURE) + 1) != SIGNATURE:
             return
     finally:
-        os.close(lock)
+        os.close(held)
     shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -114,14 +113,17 @@ def is_own(status: os.stat_result) -> bool:
     return os.name != "posix" or status.st_uid == os.geteuid()
 
 
-def _lock(file: int) -> bool:
-    """Locks a file until it is closed, or its process ends; returns whether nobody else has locked it."""
+def lock(file: int, *, shared: bool = False) -> bool:
+    """Locks a file until it is closed, or its process ends; returns whether nobody else has locked it.
+
+    shared : others may lock it so at the same time (on Windows nobody else may)
+    """
     try:
         if sys.platform == "win32":
             os.lseek(file, LOCKED_BYTE, os.SEEK_SET)
             msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
         else:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
     except OSError:
         return False
     return True

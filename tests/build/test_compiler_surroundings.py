@@ -63,7 +63,11 @@ def test_a_compiler_gets_two_variables_and_no_other(tmp_path, monkeypatch):
     with pytest.raises(BuildError, match=r"compiler for .* failed"):
         compile_library([tmp_path / "any.c"], host_platform(), tmp_path / "any.so")
     variables = dict(line.split("=", 1) for line in heard.read_text().split("\0") if line)
-    assert variables == dict.fromkeys(("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR"), str(cache_folder()))
+    assert variables.keys() == {"ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR"}
+    assert variables["ZIG_GLOBAL_CACHE_DIR"] == str(cache_folder())
+    objects = Path(variables["ZIG_LOCAL_CACHE_DIR"])
+    assert objects.is_relative_to(cache_folder())  # a folder of this compilation alone
+    assert not objects.exists()
 
 
 @pytest.mark.parametrize("name", HOSTILE)
