@@ -58,6 +58,7 @@ def build_fmu(scene: Scene, output: str | Path, fmi: int = 3, platforms: Sequenc
         names = source_file_names(sources, fmi)
         binaries = aside.submit(compile_sources, packed, names, fmi, platforms, scene.name)
         beside = companions(model, entries, fmi, evidence)
+    check_fmu_output(output)  # something else may have come there in the meantime
     content = {"modelDescription.xml": description, **packed, **binaries.result(), **beside}
     write_archive(content, output)
     return output

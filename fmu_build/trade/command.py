@@ -37,6 +37,7 @@ def trade(options: argparse.Namespace) -> int:
                 left = [name for name in ("trade.png", "trade.svg") if (folder / name).exists()]
                 earlier = f"; {' and '.join(left)} there are of an earlier trade" if left else ""
                 print_problem(f"no plot: matplotlib is not installed (pip install matplotlib){earlier}")
+            _check_trade_files(folder, options.scene)  # something else may have come there in the meantime
             write_files({folder / f"trade.{kind}": content for kind, content in files.items()})
     except (SceneError, BuildError, OutputError) as error:
         print_problem(error)

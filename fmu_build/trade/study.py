@@ -25,6 +25,7 @@ from fmu_build.flight.experiment import SLACK, Course, course_of, experiment_of
 from fmu_build.flight.flying import Flown, fly_all
 from fmu_build.flight.results import BUILT_WITH
 from fmu_build.flight.workshop import Workshop, builds, workshop
+from fmu_build.storage.cache import LARGEST_FILE
 from supervessel.problems import TradeError
 from supervessel.scene.schema import Scene, without_accuracy
 
@@ -145,6 +146,8 @@ def study(scene: Scene, *, quick: bool = False, progress: Progress = lambda *_: 
 def is_trade(file: Path) -> bool:
     """Whether a file is a trade, as trade.json holds it."""
     try:
+        if file.stat().st_size > LARGEST_FILE:
+            return False
         found = json.loads(file.read_bytes())
     except (OSError, ValueError, RecursionError):
         return False

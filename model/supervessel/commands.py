@@ -6,7 +6,7 @@ supervessel cache [--clear]
 """
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import get_args
@@ -69,12 +69,11 @@ def _add_import(parser: argparse.ArgumentParser) -> None:
 def _import(options: argparse.Namespace) -> int:
     output: Path = options.output
     try:
-        if check_output(output, [options.scenario, *filter(None, [options.table])]) and not options.force:
-            raise OutputError(output, "is there already; --force replaces it")
+        _check_scene_output(output, [options.scenario, *filter(None, [options.table])], options.force)
         made = import_scenario(
             options.scenario, options.vessel, options.config, options.table, options.convention
         )
-        check_output(output, made.sources)
+        _check_scene_output(output, made.sources, options.force)  # it may have come there in the meantime
         for note in first(made.notes, "notes, all of them at the head of the scene"):
             print_problem(f"note: {note}")
         write_file(output, made.text.encode())
@@ -82,6 +81,12 @@ def _import(options: argparse.Namespace) -> int:
         print_problem(error)
         return 1
     return print_results(str(output), "the scene is written, its path")
+
+
+def _check_scene_output(output: Path, inputs: Iterable[Path], force: bool) -> None:
+    """Raises OutputError where a scene file cannot be written, or would replace something unasked."""
+    if check_output(output, inputs) and not force:
+        raise OutputError(output, "is there already; --force replaces it")
 
 
 def _add_trade(parser: argparse.ArgumentParser) -> None:

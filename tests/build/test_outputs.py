@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from fmu_build import BuildError, build_fmu
+from fmu_build import BuildError, build, build_fmu
 from orbiter.files import Files
-from supervessel import Twin, load_scene
+from supervessel import Twin, commands, load_scene
 from support import processes
 from support.processes import cache, needs_posix
 
@@ -245,3 +245,30 @@ def test_generated_c_never_replaces_a_users(folder):
     ):
         twin.generate(folder / "out", ["ode"], derivatives=0)
     assert everything(folder / "out") == {"ball_twin.c": b"int mine;\n"}
+
+
+def test_what_has_come_in_the_meantime_is_not_replaced_by_a_build(folder, monkeypatch):
+    """The check before the work says nothing of what is there when it is done."""
+    output, real = folder / "out" / "ball.fmu", build.companions
+
+    def while_it_compiles(*arguments):
+        output.write_text("my thesis")
+        return real(*arguments)
+
+    monkeypatch.setattr(build, "companions", while_it_compiles)
+    with pytest.raises(BuildError, match="is there already and is no FMU"):
+        build_fmu(load_scene(folder / "ball.toml"), output)
+    assert output.read_text() == "my thesis"
+
+
+def test_what_has_come_in_the_meantime_is_not_replaced_by_an_import(folder, monkeypatch):
+    output, real = folder / "out" / "side.toml", commands.import_scenario
+
+    def while_it_reads(*arguments):
+        output.write_text("my thesis")
+        return real(*arguments)
+
+    monkeypatch.setattr(commands, "import_scenario", while_it_reads)
+    monkeypatch.chdir(folder)
+    assert commands.main([*COMMANDS["import"].words[1:], "-o", str(output)]) == 1
+    assert output.read_text() == "my thesis"

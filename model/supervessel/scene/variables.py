@@ -211,8 +211,11 @@ def derivative_variables(states: Iterable[Variable]) -> tuple[Variable, ...]:
 
 
 def _usable(nominal: float) -> float:
-    """Returns a magnitude, 1 where it would be none: zero or beyond all doubles."""
-    return nominal if isfinite(nominal) and nominal > 0.0 else 1.0
+    """Returns a magnitude in three digits, 1 where it would be none: zero or beyond all doubles.
+
+    More digits differ between processors: numpy's library of linear algebra adds up in different orders.
+    """
+    return float(f"{nominal:.3g}") if isfinite(nominal) and nominal > 0.0 else 1.0
 
 
 def _rate(scene: Scene) -> float:
