@@ -100,12 +100,12 @@ def scene_header(
     functions : those of model.c
     loop      : tables of the composite's loop
     """
-    scene, where = model.resolved.scene, model.slices
+    scene, where = model.resolved.scene, model.slices.composite
     references = {entry.variable.name: entry.reference for entry in entries}
-    p_count, k_count, u_count = len(model.p_names), len(model.k_names), len(model.u_names)
+    p_count, k_count, u_count = len(model.names.p), len(model.names.k), len(model.names.u)
     sizes = [(f.sz_arg(), f.sz_res(), f.sz_iw(), f.sz_w()) for f in functions]
     arg, res, iw, w = (max(1, *column) for column in zip(*sizes, strict=True))
-    begun = [f for f in model.propagation if f.name() == "free_start"]
+    begun = [f for f in model.steps.propagation if f.name() == "free_start"]
     constants = {
         "VARIABLE_COUNT": len(entries),
         "INPUT_P_COUNT": p_count,
@@ -118,13 +118,13 @@ def scene_header(
         "REFERENCE_RATE_START": references["angular_velocity_start[1]"],
         "REFERENCE_ATTITUDE_START": references["attitude_start[1]"],
         "REFERENCE_OUTPUTS": 1 + p_count + k_count + u_count + 7,
-        "OUTPUT_COUNT": len(model.y_names),
+        "OUTPUT_COUNT": len(model.names.y),
         "REFERENCE_STATES": references["state.attitude[1]"],
         "REFERENCE_DERIVATIVES": references["der(state.attitude[1])"],
-        "STATE_COUNT": len(model.x_names),
+        "STATE_COUNT": len(model.names.z),
         "COMPOSITE_COUNT": model.composite.numel_out(0),
-        "AXES_FREE": model.axes_slices.get("free", slice(0)).start or 0,
-        "AXES_SERIES": model.axes_slices.get("series", slice(0)).start or 0,
+        "AXES_FREE": model.slices.axes.get("free", slice(0)).start or 0,
+        "AXES_SERIES": model.slices.axes.get("series", slice(0)).start or 0,
         "FREE_VARYING": begun[0].numel_out(0) if begun else 0,
         "FREE_CONSTANT": begun[0].numel_out(1) if begun else 0,
         "FREE_START": CONSTANTS,
@@ -146,7 +146,7 @@ def scene_header(
         **loop_constants(loop),
         "STEPS": f"STEPS_BY_{plan.method.control.upper()}" if plan.method else "STEPS_NONE",
         "FREE": f"FREE_{plan.free.upper().replace(' ', '_')}",
-        "ERROR_EXPONENT": model.error_exponent,
+        "ERROR_EXPONENT": model.steps.error_exponent,
         "SAFETY": repr(plan.method.safety if plan.method else 1.0),
         "PRODUCT_COUNT": model.product_count,
         "TOLERANCE": repr(scene.rotation.tolerance),

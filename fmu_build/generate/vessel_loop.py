@@ -89,7 +89,7 @@ def loop_tables(model: Equations) -> Tables | None:
     if inputs.docked or inputs.motion or inputs.force or inputs.vessel_torque:
         return None
     tables = Tables()
-    where = {name: place for place, name in enumerate(model.p_names)}
+    where = {name: place for place, name in enumerate(model.names.p)}
     numbers = {vessel: number for number, group in enumerate(resolved.groups) for vessel in group.inside}
     seen = _varying_bodies(resolved)
     for number, group in enumerate(resolved.groups):

@@ -88,10 +88,10 @@ def _dependencies(model: Equations, knowns: Sequence[int], booleans: Set[int]) -
                instant alone
     booleans : those of Booleans among them
     """
-    p, u, z = (ca.SX.sym(*s) for s in (("p", len(model.p_names)), ("u", len(model.u_names)), ("z", 7)))
+    p, u, z = (ca.SX.sym(*s) for s in (("p", len(model.names.p)), ("u", len(model.names.u)), ("z", 7)))
     c = model.composite(p)
     # principal moments and axes follow from every element of the inertia, and not linearly
-    a = ca.repmat(ca.sumsqr(c[model.slices["inertia"]]), model.axes.numel_out(0))
+    a = ca.repmat(ca.sumsqr(c[model.slices.composite["inertia"]]), model.axes.numel_out(0))
     known = ca.vertcat(z, p, u)
     rows_of = _rows if model.composite.n_instructions() <= LONGEST_CODE else _rows_by_structure
 
@@ -100,14 +100,17 @@ def _dependencies(model: Equations, knowns: Sequence[int], booleans: Set[int]) -
 
     follows = _after_change(model, z, p, c)
     now = rows(
-        {"output": model.state_outputs(follows, u, c, a, 0.0), "derivative": model.state_ode(follows, u, c)}
+        {
+            "output": model.exchange.outputs(follows, u, c, a, 0.0),
+            "derivative": model.exchange.ode(follows, u, c),
+        }
     )
     if model.change is None:
         return now, now | rows({"state": z})
     begun = (
         ca.vertcat(z[:4], model.change.momentum_of(z[4:], c)) if keeps_momentum(model.resolved.scene) else z
     )
-    rate = ca.vertcat(model.ode(z, u, c)[:4], model.state_ode(begun, u, c)[4:])
+    rate = ca.vertcat(model.ode(z, u, c)[:4], model.exchange.ode(begun, u, c)[4:])
     return now, rows({"output": model.outputs(z, u, c, a, 0.0), "derivative": rate, "state": begun})
 
 

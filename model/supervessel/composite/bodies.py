@@ -14,9 +14,29 @@ from supervessel.composite.inertia import Body, combine, orbiter_moments, placed
 from supervessel.composite.poses import Pose, constant, mated_pose, port_axes, scaled
 from supervessel.composite.resolved import ResolvedScene, RigidGroup
 from supervessel.scene.schema import Scene
+from supervessel.scene.variables import InputVariable
 
 Lookup = Callable[[str, ArrayLike], ca.SX]
 """Takes an input's name without index and the scene's value; returns its symbols, or the constant."""
+
+
+def lookup_in(inputs: Sequence[InputVariable], values: ca.SX) -> Lookup:
+    """Returns the function that takes the name of an input without index to its symbols.
+
+    inputs : the inputs that have symbols; any other name is a constant, the scene's value
+    values : symbols of the inputs, in their order, (n,)
+    """
+    first: dict[str, int] = {}
+    for place, variable in enumerate(inputs):
+        first.setdefault(variable.group, place)
+
+    def lookup(group: str, value: ArrayLike) -> ca.SX:
+        if group not in first:
+            return constant(value)
+        place = first[group]
+        return values[place : place + (inputs[place].kind.elements or 1)]
+
+    return lookup
 
 
 @dataclass(frozen=True)

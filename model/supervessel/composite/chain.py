@@ -19,9 +19,11 @@ from supervessel.composite.inertia import (
     placed_body,
     upper_triangle,
 )
+from supervessel.composite.parts import body_parts
 from supervessel.composite.poses import Pose, mated_pose, port_axes
-from supervessel.equations import body_parts, derivatives, simplification
+from supervessel.derivatives import derivatives
 from supervessel.scene.schema import Scene
+from supervessel.simplification import simplification
 
 
 @simplification(True)
@@ -96,7 +98,7 @@ def kernels(scene: Scene) -> tuple[ca.Function, ...]:
     for name, (arguments, result) in ((f"loop_{step}", parts) for step, parts in steps.items()):
         if name in ("loop_middle", "loop_finish"):
             functions.append(ca.Function(name, arguments, [ca.densify(result)]))
-        functions += derivatives(name, arguments, [ca.densify(result)]).values()
+        functions += derivatives(name, arguments, [ca.densify(result)])
     return tuple(functions)
 
 
