@@ -27,11 +27,12 @@ NOWHERE = "{1, 0}"
 
 @dataclass(frozen=True)
 class Row:
-    """A body of LOOP_BODIES.
+    """A row of LOOP_BODIES.
 
-    frame         : number of its group's frame
-    mass, moments : where they stand, LoopPlace
-    held          : its constants
+    kind          : name of the body's kind in C, how it is seen from the root's axes
+    frame         : number of the frame of the body's group
+    mass, moments : where they stand, each a LoopPlace of C
+    held          : the body's constants
     """
 
     kind: str

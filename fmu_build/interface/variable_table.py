@@ -81,12 +81,14 @@ def variable_table(model: Equations) -> tuple[TableEntry, ...]:
 
 
 def _dependencies(model: Equations, knowns: Sequence[int], booleans: Set[int]) -> tuple[Rows, Rows]:
-    """Returns the dependencies of outputs and derivatives on states and inputs; and at the start those of
-    states, too, on attitude and angular velocity, which stand for the states then, and on inputs.
+    """Returns what outputs and derivatives depend on in flight; and what they and the states do at the start.
 
-    knowns   : value references of states and inputs (p, u); the motion with which a part docks acts at that
-               instant alone
-    booleans : those of Booleans among them
+    In flight they depend on states and inputs. At the start attitude and angular velocity are given in place
+    of the states, and the states depend on these and on inputs.
+
+    knowns   : value references of states and inputs (p, u); the motion with which a part docks (k) is left
+               out, as it acts at the instant of docking alone
+    booleans : the value references among them that are Booleans
     """
     p, u, z = (ca.SX.sym(*s) for s in (("p", len(model.names.p)), ("u", len(model.names.u)), ("z", 7)))
     c = model.composite(p)
@@ -115,10 +117,11 @@ def _dependencies(model: Equations, knowns: Sequence[int], booleans: Set[int]) -
 
 
 def _after_change(model: Equations, z: ca.SX, p: ca.SX, c: ca.SX) -> ca.SX:
-    """Returns what stands for the states after a change of inputs: its structure tells what they follow from.
+    """Returns an expression whose structure shows what the states depend on after a change of inputs, (7,).
 
-    A state that is the angular momentum is what a change of mass or pose keeps. An angular velocity jumps by
-    what follows from the inputs as they were and are; a dock that opens or closes makes either one jump.
+    Only its structure has a meaning. An angular momentum is kept when a mass or a pose changes. An angular
+    velocity jumps then by an amount that depends on the inputs before and after. When a dock opens or
+    closes, both jump.
     """
     if model.change is None:
         return z

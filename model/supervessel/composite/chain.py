@@ -1,6 +1,6 @@
 """The composite of a scene of many moving vessels as steps that a loop takes for one vessel after the other.
 
-The same equations in the same order as `docking.composite_body` and `inertia.combine` have for all vessels at
+The same equations in the same order as `bodies.composite_body` and `inertia.combine` have for all vessels at
 once, whose code would grow with the scene; no bit differs from theirs.
 
 Vectors: a pose (12,) is a rotation, column by column, and an origin; a port (9,) position, direction,
@@ -28,7 +28,7 @@ from supervessel.simplification import simplification
 
 @simplification(True)
 def lane_kernels(scene: Scene) -> tuple[ca.Function, ...]:
-    """Returns what is done for several vessels at once, of each the same.
+    """Returns the steps that are taken for several vessels at once.
 
     mated    : parent's port in its axes, child's port -> pose of the child in the parent's axes
     then     : pose of axes, pose in them -> pose in the outer axes
@@ -51,7 +51,7 @@ def lane_kernels(scene: Scene) -> tuple[ca.Function, ...]:
 
 @simplification(True)
 def kernels(scene: Scene) -> tuple[ca.Function, ...]:
-    """Returns what is done once, and the derivatives of all steps, called loop_...
+    """Returns the steps that are taken once, and the derivatives of all steps; their names begin with loop_.
 
     hang        : pose of the parent's group, parent's port in its axes, child's port -> pose of the child's
                   group
