@@ -60,11 +60,7 @@ def variable_table(model: Equations) -> tuple[TableEntry, ...]:
         "state": resolved.states,
         "derivative": resolved.derivatives,
     }
-    first: dict[Role, int] = {}
-    count = 0
-    for role, variables in groups.items():
-        first[role] = count
-        count += len(variables)
+    first = _first_references(groups)
     knowns = [*range(first["state"], first["state"] + 7)]
     inputs = list(enumerate(resolved.inputs, start=first["input"]))
     knowns += [reference for reference, variable in inputs if variable.part != "contact"]
@@ -78,6 +74,16 @@ def variable_table(model: Equations) -> tuple[TableEntry, ...]:
             initial = _at_start(start, first["state"], first["parameter"])
             entries.append(TableEntry(variable, first[role] + i, role, now, initial))
     return tuple(entries)
+
+
+def _first_references(groups: Mapping[Role, Sequence[Variable]]) -> dict[Role, int]:
+    """Returns the value reference of each role's first variable; references count from 0, role by role."""
+    first: dict[Role, int] = {}
+    count = 0
+    for role, variables in groups.items():
+        first[role] = count
+        count += len(variables)
+    return first
 
 
 def _dependencies(model: Equations, knowns: Sequence[int], booleans: Set[int]) -> tuple[Rows, Rows]:

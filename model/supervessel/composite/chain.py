@@ -49,6 +49,10 @@ def lane_kernels(scene: Scene) -> tuple[ca.Function, ...]:
     return tuple(ca.Function(name, arguments, [ca.densify(r)]) for name, (arguments, r) in steps.items())
 
 
+TAKEN_ONCE = ("middle", "finish")
+"""Steps of which C takes the values from `kernels`; of the other steps it takes the derivatives alone."""
+
+
 @simplification(True)
 def kernels(scene: Scene) -> tuple[ca.Function, ...]:
     """Returns the steps that are taken once, and the derivatives of all steps; their names begin with loop_.
@@ -68,6 +72,17 @@ def kernels(scene: Scene) -> tuple[ca.Function, ...]:
     add         : inertia (6,), mass, seen, centre of the first, middle -> inertia with that body
     finish      : sum, centre of the first, middle, inertia -> c
     """
+    functions: list[ca.Function] = []
+    for step, (arguments, result) in _steps(scene).items():
+        name, results = f"loop_{step}", [ca.densify(result)]
+        if step in TAKEN_ONCE:
+            functions.append(ca.Function(name, arguments, results))
+        functions += derivatives(name, arguments, results)
+    return tuple(functions)
+
+
+def _steps(scene: Scene) -> dict[str, tuple[list[ca.SX], ca.SX]]:
+    """Returns arguments and result of each step; `kernels` says what the steps are."""
     pose, inside = _pose("pose"), _pose("inside")
     parent, child, seen = (ca.SX.sym(name, 9) for name in ("parent", "child", "seen"))
     mass = ca.SX.sym("mass")
@@ -76,7 +91,7 @@ def kernels(scene: Scene) -> tuple[ca.Function, ...]:
     )
     step = mated_pose(_port(parent), _port(child))
     whole = Body(total[0], first + middle, from_upper_triangle(inertia))
-    steps = {
+    return {
         "hang": ([pose, parent, child], _flat(_as_pose(pose).then(step))),
         "hang_inside": (
             [pose, inside, parent, child],
@@ -94,12 +109,6 @@ def kernels(scene: Scene) -> tuple[ca.Function, ...]:
             ca.vertcat(*body_parts(scene, by_convention(scene, whole)).values()),
         ),
     }
-    functions = []
-    for name, (arguments, result) in ((f"loop_{step}", parts) for step, parts in steps.items()):
-        if name in ("loop_middle", "loop_finish"):
-            functions.append(ca.Function(name, arguments, [ca.densify(result)]))
-        functions += derivatives(name, arguments, [ca.densify(result)])
-    return tuple(functions)
 
 
 def _seen_bodies(scene: Scene) -> dict[str, tuple[list[ca.SX], ca.SX]]:
