@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fmu_build.compile.compiler import compile_library
-from fmu_build.generate.scene_files import digest
-from fmu_build.generate.sources import LAYER
+from fmu_build.generate.sources import LAYER, digest
 from fmu_build.platforms import host_platform
 from supervessel.problems import unknown
 from supervessel.shell.files import write_file

@@ -93,7 +93,7 @@ def series_operations(order: int, *, gyroscopic: bool, turned: bool) -> int:
 @interrupt_afterwards()
 def costs(model: Equations, law: Law, tolerance: float) -> Costs:
     """Returns the operations of a scene's library, flown at a tolerance."""
-    count = {f.name(): operations(f) for f in (*model.propagation, *model.changing)}
+    count = {f.name(): operations(f) for f in (*model.steps.propagation, *model.changing)}
     changing = (f.name() for f in model.changing if not f.name().endswith(("_forward", "_reverse")))
     changed = operations(model.composite) + operations(model.axes) + sum(count[name] for name in changing)
     free = free_operations()

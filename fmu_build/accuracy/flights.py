@@ -33,12 +33,12 @@ def followed(scene: Scene, shop: Workshop, every: Histories, choice: Choice) -> 
 def body_of(scene: Scene, model: Equations) -> Body:
     """Returns the function that tells of a row of inputs how the body answers what acts."""
     numbers, docks = names_of(scene)
-    acting = len(model.u_names)
+    acting = len(model.names.u)
 
     def body(row: Array, booleans: Array) -> tuple[Array, Array]:
         values = dict(zip((*numbers, *docks), (*row, *booleans), strict=True))
-        c = model.composite([values[name] for name in model.p_names])
-        xx, yy, zz, xy, xz, yz = np.array(c).ravel()[model.slices["inertia"]]
+        c = model.composite([values[name] for name in model.names.p])
+        xx, yy, zz, xy, xz, yz = np.array(c).ravel()[model.slices.composite["inertia"]]
         at_rest = [1.0, *6 * [0.0]]
         gains = [np.array(model.ode(at_rest, unit, c)).ravel()[4:] for unit in np.eye(acting)]
         return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), np.array(gains).T

@@ -9,8 +9,8 @@ import casadi as ca
 
 from fmu_build.compile.compiler import FLAGS, compile_library
 from fmu_build.errors import BuildError
+from fmu_build.generate.equations_source import generated_c
 from fmu_build.generate.model import generate as scene_sources
-from fmu_build.generate.scene_files import generated
 from fmu_build.generate.sources import source_files
 from fmu_build.platforms import host_platform
 from supervessel.scene.schema import Scene
@@ -113,4 +113,4 @@ def _source(functions: Sequence[ca.Function], file: str, derivatives: int) -> st
         if derivatives > 1:
             generator.add(function.forward(1).forward(1))
             generator.add(function.reverse(1).forward(1))
-    return generated(generator, file)
+    return generated_c(generator, file)

@@ -41,7 +41,7 @@ def reference_result(model: Equations) -> dict[str, bytes]:
     resolved, scene = model.resolved, model.resolved.scene
     inputs = resolved.inputs
     first = np.zeros(len(inputs))
-    first[: len(model.p_names)] = p_start(scene)
+    first[: len(model.names.p)] = p_start(scene)
     step = scene.experiment.step if scene.experiment else DEFAULT_STEP
     for _ in range(ATTEMPTS):
         duration = step * STEPS
@@ -67,12 +67,12 @@ def reference_result(model: Equations) -> dict[str, bytes]:
 
 
 def _composite(model: Equations, inputs: Array) -> Array:
-    return np.array(model.composite(inputs[: len(model.p_names)])).ravel()
+    return np.array(model.composite(inputs[: len(model.names.p)])).ravel()
 
 
 def _action(model: Equations, inputs: Array) -> Array:
     """Returns those of all inputs that act; they are the last ones."""
-    return inputs[len(inputs) - len(model.u_names) :]
+    return inputs[len(inputs) - len(model.names.u) :]
 
 
 def _last_inputs(
@@ -107,13 +107,13 @@ def _fly(scene: Scene, model: Equations, stimuli: Array, step: float) -> Array |
         c, u = _composite(model, held), _action(model, held)
         remaining = step
         while remaining > 0.0:
-            square = float(model.fastest_square(x, u, c))
+            square = float(model.steps.fastest_square(x, u, c))
             count = remaining * sqrt(square) / scene.rotation.max_angle_step if square >= 0.0 else np.inf
             taken += 1
             if not taken + count <= MOST_SUB_STEPS:
                 return None
             size = remaining / max(1, ceil(count))
-            x = np.array(model.step.call([x, u, c, size])[0]).ravel()
+            x = np.array(model.steps.step.call([x, u, c, size])[0]).ravel()
             remaining = remaining - size if count > 1.0 else 0.0
         rows.append(_outputs(model, x, held))  # of the step's end: its inputs still hold
         held = inputs

@@ -14,8 +14,10 @@ def change_constants(model: Equations) -> dict[str, int]:
         "STATE_IS_MOMENTUM": int(model.change is not None and keeps_momentum(scene)),
         "MASSES_KEEP_MOMENTUM": int(keeps.get("mass") == "momentum"),
         "POSES_KEEP_MOMENTUM": int(keeps.get("pose") == "momentum"),
-        "SPINS": int("momentum" in model.slices),
-        "COMPOSITE_SPIN": model.slices["momentum"].start if "momentum" in model.slices else 0,
+        "SPINS": int("momentum" in model.slices.composite),
+        "COMPOSITE_SPIN": model.slices.composite["momentum"].start
+        if "momentum" in model.slices.composite
+        else 0,
         "DOCK_COUNT": len(scene.docks) if scene.inputs.docked else 0,
         "VESSEL_COUNT": len(scene.vessels),
     }
@@ -42,8 +44,8 @@ def _dock_rows(model: Equations) -> list[str]:
         one, other = dock.ports
         flag, motion = -1, -1
         if dock.name is not None and dock.name in scene.inputs.docked:
-            flag = model.p_names.index(f"{dock.name}.docked")
-            motion = model.k_names.index(f"{dock.name}.velocity[1]")
+            flag = model.names.p.index(f"{dock.name}.docked")
+            motion = model.names.k.index(f"{dock.name}.velocity[1]")
         names = [vessel_of(name) for name in (one, other)]
         numbers = f"{vessels[names[0]]}, {vessels[names[1]]}, {flag}, {motion}"
         rows.append(f'{{"{one}", "{other}", "{names[0]}", "{names[1]}", {numbers}}}')

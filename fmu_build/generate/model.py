@@ -3,9 +3,12 @@
 from collections.abc import Sequence
 
 from fmu_build.generate.change_tables import change_tables
-from fmu_build.generate.scene_files import digest, model_source, scene_header, scene_source
-from fmu_build.generate.sources import source_file_names, source_files
-from fmu_build.generate.vessel_loop import loop_functions, loop_source, loop_steps, loop_tables
+from fmu_build.generate.equations_source import model_source
+from fmu_build.generate.lane_steps import loop_steps
+from fmu_build.generate.scene_header import scene_header
+from fmu_build.generate.scene_source import scene_source
+from fmu_build.generate.sources import digest, source_file_names, source_files
+from fmu_build.generate.vessel_loop import loop_functions, loop_source, loop_tables
 from fmu_build.interface.model_description import model_description
 from fmu_build.interface.variable_table import TableEntry, variable_table
 from supervessel.equations import Equations, equations
@@ -35,7 +38,7 @@ def generated(model: Equations, entries: Sequence[TableEntry], fmi: int) -> tupl
         "model.c": model_source(functions),
         "scene.h": scene_header(model, entries, functions, loop),
         "scene.c": scene_source(entries, "", changing) + tables,
-        "lane_kernels.h": loop_steps(scene, loop),
+        "lane_kernels.h": loop_steps(scene, loop is not None),
     }
     names = source_file_names(sources, fmi)
     without_token = model_description(scene, entries, "", fmi, names)

@@ -5,6 +5,7 @@ importer that links the sources into a program gives the prefix to its compiler.
 are the importer's own.
 """
 
+import hashlib
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -118,3 +119,12 @@ def _build_description(model_identifier: str, names: Iterable[str]) -> str:
     ET.indent(root, "  ")
     text: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
     return text.decode() + "\n"
+
+
+def digest(*texts: str | bytes) -> str:
+    """Returns the token of an FMU that is made of these texts: another one as soon as any text differs."""
+    together = hashlib.sha256()
+    for text in texts:
+        raw = text.encode() if isinstance(text, str) else text
+        together.update(len(raw).to_bytes(8, "little") + raw)
+    return "{" + together.hexdigest() + "}"

@@ -1,19 +1,19 @@
-"""C tables of the composite of many moving vessels, which a loop puts together; see fmu_build/c/loop.c."""
+"""C tables of the composite of many moving vessels, which a loop in C puts together: fmu_build/c/loop.c."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from supervessel.composite.chain import kernels, lane_kernels
+from supervessel.composite.chain import kernels
 from supervessel.composite.constants import seen_in_group
+from supervessel.composite.docks import Joint
 from supervessel.composite.inertia import UPPER_TRIANGLE
 from supervessel.composite.poses import scaled
 from supervessel.composite.resolved import ResolvedScene, RigidGroup
 from supervessel.equations import Equations
-from supervessel.scene.schema import Scene
 
 LONGEST_CODE = 2000
 """Instructions of a composite beyond which a loop is faster, and compiled in seconds instead of minutes."""
@@ -24,27 +24,15 @@ LANES = 2
 NOWHERE = "{1, 0}"
 """LoopPlace of zeros: LOOP_HELD begins with them."""
 
-OPERATIONS = {
-    ca.OP_ADD: "{} + {}",
-    ca.OP_SUB: "{} - {}",
-    ca.OP_MUL: "{} * {}",
-    ca.OP_DIV: "{} / {}",
-    ca.OP_NEG: "-{}",
-    ca.OP_SQ: "{0} * {0}",
-    ca.OP_TWICE: "{0} + {0}",
-    ca.OP_SQRT: "lanes_sqrt({})",
-    ca.OP_FABS: "lanes_fabs({})",
-}
-"""What the steps for several vessels at once are made of, C on numbers of type Lanes."""
-
 
 @dataclass(frozen=True)
 class Row:
-    """A body of LOOP_BODIES.
+    """A row of LOOP_BODIES.
 
-    frame         : number of its group's frame
-    mass, moments : where they stand, LoopPlace
-    held          : its constants
+    kind          : name of the body's kind in C, how it is seen from the root's axes
+    frame         : number of the frame of the body's group
+    mass, moments : where they stand, each a LoopPlace of C
+    held          : the body's constants
     """
 
     kind: str
@@ -77,48 +65,85 @@ class Tables:
         return 12 * (2 * frames + 2 * LANES) + 19 * bodies + 3 + 2 * (4 + 3 + 6)
 
 
-def loop_tables(model: Equations) -> Tables | None:
-    """Returns the tables of a scene whose composite is a loop; None for one that is short or needs more.
+@dataclass(frozen=True)
+class LoopScene:
+    """What the rows of a loop's tables are made from.
 
-    Docks that open, ports with velocities, and what is known of single vessels are for straight code alone.
+    resolved : the scene
+    inputs   : where each input that shapes the composite stands in p, by name
+    frames   : number of the frame of each vessel: of its rigid group
+    seen     : centre (3,) [m] and inertia over mass (3, 3) [m2] of the vessels that vary, each in the axes of
+               its group
     """
-    resolved, scene = model.resolved, model.resolved.scene
-    inputs = scene.inputs
-    if model.composite.n_instructions() <= LONGEST_CODE or resolved.vessels_shown:
+
+    resolved: ResolvedScene
+    inputs: Mapping[str, int]
+    frames: Mapping[str, int]
+    seen: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
+
+
+def loop_tables(model: Equations) -> Tables | None:
+    """Returns the tables of a scene whose composite is a loop; None where it is straight code."""
+    if not _suits_loop(model):
         return None
-    if inputs.docked or inputs.motion or inputs.force or inputs.vessel_torque:
-        return None
-    tables = Tables()
-    where = {name: place for place, name in enumerate(model.p_names)}
-    numbers = {vessel: number for number, group in enumerate(resolved.groups) for vessel in group.inside}
-    seen = _varying_bodies(resolved)
-    for number, group in enumerate(resolved.groups):
+    loop, tables = _loop_scene(model), Tables()
+    for frame, group in enumerate(model.resolved.groups):
         (way,) = group.ways
-        if way.joint is None:
-            tables.frames.append(f"{{FRAME_ROOT, 0, 0, {NOWHERE}, {NOWHERE}}}")
-        else:
-            joint, parent = way.joint, numbers[way.joint.parent]
-            ports = ", ".join(_port(scene, name, where, tables) for name in joint.ports)
-            is_first = resolved.groups[parent].reference == joint.parent
-            kind = "FRAME_FIRST" if is_first else "FRAME_INSIDE"
-            pose = resolved.groups[parent].inside[joint.parent]
-            at = 0 if is_first else tables.hold(pose.rotation, pose.origin)
-            tables.frames.append(f"{{{kind}, {_pose_at(parent)}, {at}, {ports}}}")
-        for row in _bodies(scene, number, group, seen, where, tables):
+        tables.frames.append(_frame(loop, way.joint, tables))
+        for row in _bodies(loop, frame, group, tables):
             _add_body(row, tables)
     _fill_up(tables)
     return tables
 
 
+def _suits_loop(model: Equations) -> bool:
+    """Whether the composite is long enough for a loop, and made of steps that the loop has.
+
+    The loop has no docks that open, no ports that move, no forces at points, and it keeps nothing of single
+    vessels: that is for straight code alone.
+    """
+    inputs = model.resolved.scene.inputs
+    beyond = inputs.docked or inputs.motion or inputs.force or inputs.vessel_torque
+    return not (beyond or model.resolved.vessels_shown or model.composite.n_instructions() <= LONGEST_CODE)
+
+
+def _loop_scene(model: Equations) -> LoopScene:
+    resolved = model.resolved
+    placed = {name: group.inside[name] for group in resolved.groups for name in group.varying}
+    seen = zip(*seen_in_group(resolved.scene, placed), strict=True) if placed else ()
+    return LoopScene(
+        resolved,
+        inputs={name: place for place, name in enumerate(model.names.p)},
+        frames={vessel: number for number, group in enumerate(resolved.groups) for vessel in group.inside},
+        seen=dict(zip(placed, seen, strict=True)),
+    )
+
+
+def _frame(loop: LoopScene, joint: Joint | None, tables: Tables) -> str:
+    """Returns the row of a group's axes.
+
+    joint : of the group's vessel that hangs on another group; None for the root's own group
+    """
+    if joint is None:
+        return f"{{FRAME_ROOT, 0, 0, {NOWHERE}, {NOWHERE}}}"
+    frame = loop.frames[joint.parent]
+    parent = loop.resolved.groups[frame]
+    ports = ", ".join(_port(loop, name, tables) for name in joint.ports)
+    if parent.reference == joint.parent:
+        return f"{{FRAME_FIRST, {_pose_at(frame)}, 0, {ports}}}"
+    pose = parent.inside[joint.parent]
+    return f"{{FRAME_INSIDE, {_pose_at(frame)}, {tables.hold(pose.rotation, pose.origin)}, {ports}}}"
+
+
 def _add_body(row: Row, tables: Tables) -> None:
-    """Adds a row; as many rows of a kind as there are lanes stand together."""
+    """Adds a row; rows of a kind stand together in blocks of LANES."""
     if tables.bodies and row.kind != tables.bodies[-1].kind:
         _fill_up(tables)
     tables.bodies.append(row)
 
 
 def _fill_up(tables: Tables) -> None:
-    """Completes the last rows of a kind by bodies that are nothing: they add zeros to sums."""
+    """Completes the last rows of a kind by bodies without mass, which add zeros to sums."""
     while len(tables.bodies) % LANES:
         last = tables.bodies[-1]
         tables.bodies.append(Row(last.kind, 0, NOWHERE, [0.0] * len(last.held)))
@@ -130,10 +155,11 @@ def _pose_at(frame: int) -> int:
     return 12 * LANES * block + lane
 
 
-def _port(scene: Scene, name: str, where: dict[str, int], tables: Tables) -> str:
+def _port(loop: LoopScene, name: str, tables: Tables) -> str:
     """Returns where a port's position, direction and alignment stand."""
+    scene = loop.resolved.scene
     if name in scene.inputs.pose:
-        return _input(where[f"{name}.position[1]"])
+        return _input(loop.inputs[f"{name}.position[1]"])
     port = scene.port(name)
     return _constant(tables.hold(port.position, scaled(port.direction), scaled(port.alignment)))
 
@@ -146,46 +172,38 @@ def _constant(place: int) -> str:
     return f"{{1, {place}}}"
 
 
-Seen = dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
-"""Centre (3,) [m] and tensor over mass (3, 3) [m2] of vessels, each in the axes of its group."""
-
-
-def _varying_bodies(resolved: ResolvedScene) -> Seen:
-    """Returns the vessels that vary, of all groups."""
-    placed = {name: group.inside[name] for group in resolved.groups for name in group.varying}
-    return (
-        dict(zip(placed, zip(*seen_in_group(resolved.scene, placed), strict=True), strict=True))
-        if placed
-        else {}
-    )
-
-
-def _bodies(  # noqa: PLR0913, PLR0917
-    scene: Scene, frame: int, group: RigidGroup, seen: Seen, where: dict[str, int], tables: Tables
-) -> list[Row]:
-    """Returns the rows of a group's bodies: what is constant, then vessels that vary."""
+def _bodies(loop: LoopScene, frame: int, group: RigidGroup, tables: Tables) -> list[Row]:
+    """Returns the rows of a group's bodies: its constant vessels as one body, then the vessels that vary."""
     rows = []
-    kind = "BODY" if frame else "BODY_OWN"
     if group.fixed is not None:
         mass, centre, inertia = group.fixed
-        rows.append(Row(f"{kind}_FIXED", frame, _constant(tables.hold(mass)), _body(centre, inertia)))
-    for name in group.varying:
-        vessel = scene.vessels[name]
-        given = f"{name}.mass" in where
-        mass_at = _input(where[f"{name}.mass"]) if given else _constant(tables.hold(vessel.mass))
-        moments_at = _input(where[f"{name}.pmi[1]"]) if name in scene.inputs.pmi else NOWHERE
-        centre, specific = seen[name]
-        own_axes = frame > 0 and name == group.reference and not any(vessel.centre_of_mass)
-        if own_axes and name in scene.inputs.pmi:
-            rows.append(Row("BODY_DIAGONAL_FREE", frame, mass_at, moments=moments_at))
-        elif own_axes and vessel.pmi is not None:
-            rows.append(Row("BODY_DIAGONAL", frame, mass_at, vessel.pmi))
-        elif name in scene.inputs.pmi:
-            rotation = np.ravel(np.array(ca.evalf(group.inside[name].rotation)), order="F")
-            rows.append(Row(f"{kind}_FREE", frame, mass_at, [*rotation, *centre], moments_at))
-        else:
-            rows.append(Row(f"{kind}_SCALED", frame, mass_at, _body(centre, specific)))
-    return rows
+        kind = f"{_kind(frame)}_FIXED"
+        rows.append(Row(kind, frame, _constant(tables.hold(mass)), _body(centre, inertia)))
+    return rows + [_varying_body(loop, frame, group, name, tables) for name in group.varying]
+
+
+def _kind(frame: int) -> str:
+    """Returns how the names of a group's kinds of bodies begin; the root's own group is not placed."""
+    return "BODY" if frame else "BODY_OWN"
+
+
+def _varying_body(loop: LoopScene, frame: int, group: RigidGroup, name: str, tables: Tables) -> Row:
+    """Returns the row of a vessel whose mass or moments vary."""
+    vessel, inputs = loop.resolved.scene.vessels[name], loop.inputs
+    given = f"{name}.mass" in inputs
+    mass = _input(inputs[f"{name}.mass"]) if given else _constant(tables.hold(vessel.mass))
+    free = name in loop.resolved.scene.inputs.pmi
+    moments = _input(inputs[f"{name}.pmi[1]"]) if free else NOWHERE
+    centre, specific = loop.seen[name]
+    own_axes = frame > 0 and name == group.reference and not any(vessel.centre_of_mass)
+    if own_axes and free:
+        return Row("BODY_DIAGONAL_FREE", frame, mass, moments=moments)
+    if own_axes and vessel.pmi is not None:
+        return Row("BODY_DIAGONAL", frame, mass, vessel.pmi)
+    if free:
+        R_group_vessel = np.ravel(np.array(ca.evalf(group.inside[name].rotation)), order="F")
+        return Row(f"{_kind(frame)}_FREE", frame, mass, [*R_group_vessel, *centre], moments)
+    return Row(f"{_kind(frame)}_SCALED", frame, mass, _body(centre, specific))
 
 
 def _body(centre: NDArray[np.float64], inertia: NDArray[np.float64]) -> list[float]:
@@ -207,39 +225,8 @@ def _body_rows(tables: Tables) -> list[str]:
 
 
 def loop_functions(model: Equations) -> list[ca.Function]:
-    """Returns what the FMU needs where its composite is a loop."""
+    """Returns the functions that the FMU needs where its composite is a loop."""
     return [*model.functions_beside_composite, *kernels(model.resolved.scene)]
-
-
-def loop_steps(scene: Scene, tables: Tables | None) -> str:
-    """Returns lane_kernels.h: the steps for several vessels at once; without a loop, none."""
-    if tables is None:
-        return "/* Generated: this scene has no loop. */\n"
-    return (
-        "/* Generated: steps for several vessels at once; see supervessel/kernels.py. */\n"
-        '#include "lanes.h"\n\n' + "\n".join(map(_lane_code, lane_kernels(scene)))
-    )
-
-
-def _lane_code(function: ca.Function) -> str:
-    """Returns straight C of a function, operation by operation as CasADi has put them in order."""
-    lines = []
-    for number in range(function.n_instructions()):
-        kind, to = function.instruction_id(number), function.instruction_output(number)
-        of = function.instruction_input(number)
-        if kind == ca.OP_OUTPUT:
-            lines.append(f"res[{to[1]}] = w{of[0]};")
-        elif kind == ca.OP_INPUT:
-            lines.append(f"w{to[0]} = arg[{of[0]}][{of[1]}];")
-        elif kind == ca.OP_CONST:
-            lines.append(f"w{to[0]} = lanes_all({function.instruction_constant(number)!r});")
-        else:
-            lines.append(f"w{to[0]} = {OPERATIONS[kind].format(*(f'w{i}' for i in of))};")
-    work = ", ".join(f"w{i}" for i in range(function.sz_w()))
-    body = "\n".join(f"    {line}" for line in [f"Lanes {work};", *lines])
-    return (
-        f"LANES_INLINE void lanes_{function.name()}(const Lanes *const arg[], Lanes res[]) {{\n{body}\n}}\n"
-    )
 
 
 def loop_constants(tables: Tables | None) -> dict[str, int]:

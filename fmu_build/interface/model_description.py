@@ -1,45 +1,13 @@
 """modelDescription.xml for FMI 2.0 and FMI 3.0, written from the variable table."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib.metadata import version
-from math import degrees
 from xml.etree import ElementTree as ET
 
+from fmu_build.interface.units import UNITS, add_types, add_units
 from fmu_build.interface.variable_table import Dependency, Role, TableEntry
 from fmu_build.interface.xml_text import xml_text
 from supervessel.scene.schema import Scene
-
-
-@dataclass(frozen=True)
-class Unit:
-    """A unit: exponents of the SI base units in FMI's order, and the quantity measured in it."""
-
-    exponents: dict[str, int]
-    type_name: str
-    quantity: str
-    display: tuple[str, float] | None = None
-
-
-UNITS = {
-    "": Unit({}, "Ratio", "Ratio"),
-    "s": Unit({"s": 1}, "Time", "Time"),
-    "1/s": Unit({"s": -1}, "QuaternionRate", "Frequency"),
-    "kg": Unit({"kg": 1}, "Mass", "Mass"),
-    "m": Unit({"m": 1}, "Length", "Length"),
-    "m/s": Unit({"m": 1, "s": -1}, "Velocity", "Velocity"),
-    "m2": Unit({"m": 2}, "SpecificMoment", "MassNormalisedMomentOfInertia"),
-    "rad": Unit({"rad": 1}, "Angle", "Angle", ("deg", degrees(1.0))),
-    "rad/s": Unit({"s": -1, "rad": 1}, "AngularVelocity", "AngularVelocity", ("deg/s", degrees(1.0))),
-    "rad/s2": Unit(
-        {"s": -2, "rad": 1}, "AngularAcceleration", "AngularAcceleration", ("deg/s2", degrees(1.0))
-    ),
-    "N": Unit({"kg": 1, "m": 1, "s": -2}, "Force", "Force"),
-    "N.m": Unit({"kg": 1, "m": 2, "s": -2}, "Torque", "Torque"),
-    "kg.m2": Unit({"kg": 1, "m": 2}, "MomentOfInertia", "MomentOfInertia"),
-    "J": Unit({"kg": 1, "m": 2, "s": -2}, "Energy", "Energy"),
-    "N.m.s": Unit({"kg": 1, "m": 2, "s": -1}, "AngularMomentum", "AngularMomentum"),
-}
 
 LOG_CATEGORIES = {
     "logStatusDiscard": "a value or a step was refused; the instance is as it was before the call",
@@ -72,6 +40,14 @@ COMMON_CAPABILITIES_3 = {
 }
 
 
+STRUCTURE_2: dict[str, tuple[Role, ...]] = {
+    "Outputs": ("output",),
+    "Derivatives": ("derivative",),
+    "InitialUnknowns": ("output", "state", "derivative"),
+}
+"""The lists of FMI 2.0's ModelStructure, and the roles of the variables in each."""
+
+
 def model_description(
     scene: Scene, entries: Sequence[TableEntry], token: str, fmi: int, sources: Sequence[str] = ()
 ) -> bytes:
@@ -102,6 +78,7 @@ def _header(scene: Scene, fmi_version: str, token_attribute: str, token: str) ->
 
 
 def _description(scene: Scene) -> str:
+    """Returns a line that says which vessels turn, and by which law."""
     others = [name for name in scene.vessels if name != scene.root]
     how = "docked, now and then" if scene.inputs.docked else "docked"
     docked = (
@@ -111,7 +88,17 @@ def _description(scene: Scene) -> str:
 
 
 def _fmi3(scene: Scene, entries: Sequence[TableEntry], token: str) -> ET.Element:
+    """Returns the model description of FMI 3.0."""
     root = _header(scene, "3.0", "instantiationToken", token)
+    _interfaces3(root, scene)
+    _definitions(root, scene, entries, "Float64Type")
+    _variables3(root, entries)
+    _structure3(root, entries)
+    return root
+
+
+def _interfaces3(root: ET.Element, scene: Scene) -> None:
+    """Writes the interfaces with their capabilities; a scene whose docks open has event mode."""
     identifier = {"modelIdentifier": scene.name}
     ET.SubElement(root, "ModelExchange", identifier | COMMON_CAPABILITIES_3)
     stepping = {
@@ -123,10 +110,10 @@ def _fmi3(scene: Scene, entries: Sequence[TableEntry], token: str) -> ET.Element
     if scene.inputs.docked:
         stepping["hasEventMode"] = "true"
     ET.SubElement(root, "CoSimulation", identifier | COMMON_CAPABILITIES_3 | stepping)
-    _units(root, entries)
-    _types(root, entries, "Float64Type")
-    _log_categories(root)
-    _experiment(root, scene)
+
+
+def _variables3(root: ET.Element, entries: Sequence[TableEntry]) -> None:
+    """Writes the variables; a derivative names its state by value reference."""
     variables = ET.SubElement(root, "ModelVariables")
     for entry in entries:
         attributes = _identity(entry) | _role(entry)
@@ -136,6 +123,10 @@ def _fmi3(scene: Scene, entries: Sequence[TableEntry], token: str) -> ET.Element
             attributes["derivative"] = str(_state_of(entry, entries).reference)
         kind = "Boolean" if entry.variable.boolean else "Float64"
         ET.SubElement(variables, kind, attributes | _type_attributes(entry))
+
+
+def _structure3(root: ET.Element, entries: Sequence[TableEntry]) -> None:
+    """Writes what outputs and derivatives depend on, by value reference."""
     structure = ET.SubElement(root, "ModelStructure")
     for entry in _of(entries, "output"):
         _unknown3(structure, "Output", entry, entry.dependencies)
@@ -143,43 +134,66 @@ def _fmi3(scene: Scene, entries: Sequence[TableEntry], token: str) -> ET.Element
         _unknown3(structure, "ContinuousStateDerivative", entry, entry.dependencies)
     for entry in _of(entries, "output", "state", "derivative"):
         _unknown3(structure, "InitialUnknown", entry, entry.initial)
-    return root
+
+
+def _unknown3(
+    structure: ET.Element, name: str, entry: TableEntry, dependencies: Sequence[Dependency]
+) -> None:
+    attributes = {"valueReference": str(entry.reference)} | _dependencies(dependencies)
+    ET.SubElement(structure, name, attributes)
 
 
 def _fmi2(scene: Scene, entries: Sequence[TableEntry], token: str, sources: Sequence[str]) -> ET.Element:
+    """Returns the model description of FMI 2.0, which counts variables from 1."""
     root = _header(scene, "2.0", "guid", token)
-    identifier = {"modelIdentifier": scene.name}
+    _interfaces2(root, scene, sources)
+    _definitions(root, scene, entries, "SimpleType")
+    _variables2(root, entries)
+    _structure2(root, entries)
+    return root
+
+
+def _interfaces2(root: ET.Element, scene: Scene, sources: Sequence[str]) -> None:
+    """Writes the interfaces with their capabilities and the names of the C files."""
     exchange = {"completedIntegratorStepNotNeeded": "true"}
     stepping = {"canHandleVariableCommunicationStepSize": "true", "maxOutputDerivativeOrder": "1"}
     for name, capabilities in (("ModelExchange", exchange), ("CoSimulation", stepping)):
-        interface = ET.SubElement(root, name, identifier | capabilities | COMMON_CAPABILITIES_2)
+        attributes = {"modelIdentifier": scene.name} | capabilities | COMMON_CAPABILITIES_2
+        interface = ET.SubElement(root, name, attributes)
         if sources:
             files = ET.SubElement(interface, "SourceFiles")
             for source in sources:
                 ET.SubElement(files, "File", name=source)
-    _units(root, entries)
-    _types(root, entries, "SimpleType")
-    _log_categories(root)
-    _experiment(root, scene)
+
+
+def _variables2(root: ET.Element, entries: Sequence[TableEntry]) -> None:
+    """Writes the variables; a derivative names its state by index."""
     variables = ET.SubElement(root, "ModelVariables")
     for entry in entries:
         element = ET.SubElement(variables, "ScalarVariable", _identity(entry) | _role(entry))
         attributes = _type_attributes(entry)
-        if entry.role == "derivative":  # FMI 2.0 counts variables from 1
+        if entry.role == "derivative":
             attributes["derivative"] = str(_state_of(entry, entries).reference + 1)
         ET.SubElement(element, "Boolean" if entry.variable.boolean else "Real", attributes)
+
+
+def _structure2(root: ET.Element, entries: Sequence[TableEntry]) -> None:
+    """Writes what outputs and derivatives depend on, by index."""
     structure = ET.SubElement(root, "ModelStructure")
-    for name, roles in (
-        ("Outputs", ("output",)),
-        ("Derivatives", ("derivative",)),
-        ("InitialUnknowns", ("output", "state", "derivative")),
-    ):
+    for name, roles in STRUCTURE_2.items():
         element = ET.SubElement(structure, name)
         for entry in _of(entries, *roles):
             dependencies = entry.initial if name == "InitialUnknowns" else entry.dependencies
             attributes = {"index": str(entry.reference + 1)} | _dependencies(dependencies, 1)
             ET.SubElement(element, "Unknown", attributes)
-    return root
+
+
+def _definitions(root: ET.Element, scene: Scene, entries: Sequence[TableEntry], type_tag: str) -> None:
+    """Writes what stands between the interfaces and the variables in both versions of FMI."""
+    add_units(root, entries)
+    add_types(root, entries, type_tag)
+    _log_categories(root)
+    _experiment(root, scene)
 
 
 def _of(entries: Sequence[TableEntry], *roles: Role) -> list[TableEntry]:
@@ -191,48 +205,15 @@ def _state_of(derivative: TableEntry, entries: Sequence[TableEntry]) -> TableEnt
     return next(entry for entry in entries if f"der({entry.variable.name})" == derivative.variable.name)
 
 
-def _unknown3(
-    structure: ET.Element, name: str, entry: TableEntry, dependencies: Sequence[Dependency]
-) -> None:
-    attributes = {"valueReference": str(entry.reference)} | _dependencies(dependencies)
-    ET.SubElement(structure, name, attributes)
-
-
 def _dependencies(dependencies: Sequence[Dependency], offset: int = 0) -> dict[str, str]:
+    """Returns what an unknown depends on, and how.
+
+    offset : of the numbers that name variables from their value references
+    """
     return {
         "dependencies": " ".join([str(d.reference + offset) for d in dependencies]),
         "dependenciesKind": " ".join([d.kind for d in dependencies]),
     }
-
-
-def _units(root: ET.Element, entries: Sequence[TableEntry]) -> None:
-    used = {entry.variable.unit for entry in entries}
-    definitions = ET.SubElement(root, "UnitDefinitions")
-    for name, unit in UNITS.items():
-        if name and name in used:
-            element = ET.SubElement(definitions, "Unit", name=name)
-            ET.SubElement(element, "BaseUnit", {base: str(power) for base, power in unit.exponents.items()})
-            if unit.display:
-                display, factor = unit.display
-                ET.SubElement(element, "DisplayUnit", name=display, factor=repr(factor))
-
-
-def _types(root: ET.Element, entries: Sequence[TableEntry], tag: str) -> None:
-    """Writes the declared types; FMI 2.0 nests the attributes in an element of their own."""
-    used = {entry.variable.unit for entry in entries}
-    definitions = ET.SubElement(root, "TypeDefinitions")
-    for name, unit in UNITS.items():
-        if name not in used:
-            continue
-        attributes = {"quantity": unit.quantity}
-        if name:
-            attributes["unit"] = name
-        if unit.display:
-            attributes["displayUnit"] = unit.display[0]
-        if tag == "SimpleType":
-            ET.SubElement(ET.SubElement(definitions, tag, name=unit.type_name), "Real", attributes)
-        else:
-            ET.SubElement(definitions, tag, {"name": unit.type_name} | attributes)
 
 
 def _log_categories(root: ET.Element) -> None:

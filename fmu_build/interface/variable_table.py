@@ -60,11 +60,7 @@ def variable_table(model: Equations) -> tuple[TableEntry, ...]:
         "state": resolved.states,
         "derivative": resolved.derivatives,
     }
-    first: dict[Role, int] = {}
-    count = 0
-    for role, variables in groups.items():
-        first[role] = count
-        count += len(variables)
+    first = _first_references(groups)
     knowns = [*range(first["state"], first["state"] + 7)]
     inputs = list(enumerate(resolved.inputs, start=first["input"]))
     knowns += [reference for reference, variable in inputs if variable.part != "contact"]
@@ -80,18 +76,30 @@ def variable_table(model: Equations) -> tuple[TableEntry, ...]:
     return tuple(entries)
 
 
-def _dependencies(model: Equations, knowns: Sequence[int], booleans: Set[int]) -> tuple[Rows, Rows]:
-    """Returns the dependencies of outputs and derivatives on states and inputs; and at the start those of
-    states, too, on attitude and angular velocity, which stand for the states then, and on inputs.
+def _first_references(groups: Mapping[Role, Sequence[Variable]]) -> dict[Role, int]:
+    """Returns the value reference of each role's first variable; references count from 0, role by role."""
+    first: dict[Role, int] = {}
+    count = 0
+    for role, variables in groups.items():
+        first[role] = count
+        count += len(variables)
+    return first
 
-    knowns   : value references of states and inputs (p, u); the motion with which a part docks acts at that
-               instant alone
-    booleans : those of Booleans among them
+
+def _dependencies(model: Equations, knowns: Sequence[int], booleans: Set[int]) -> tuple[Rows, Rows]:
+    """Returns what outputs and derivatives depend on in flight; and what they and the states do at the start.
+
+    In flight they depend on states and inputs. At the start attitude and angular velocity are given in place
+    of the states, and the states depend on these and on inputs.
+
+    knowns   : value references of states and inputs (p, u); the motion with which a part docks (k) is left
+               out, as it acts at the instant of docking alone
+    booleans : the value references among them that are Booleans
     """
-    p, u, z = (ca.SX.sym(*s) for s in (("p", len(model.p_names)), ("u", len(model.u_names)), ("z", 7)))
+    p, u, z = (ca.SX.sym(*s) for s in (("p", len(model.names.p)), ("u", len(model.names.u)), ("z", 7)))
     c = model.composite(p)
     # principal moments and axes follow from every element of the inertia, and not linearly
-    a = ca.repmat(ca.sumsqr(c[model.slices["inertia"]]), model.axes.numel_out(0))
+    a = ca.repmat(ca.sumsqr(c[model.slices.composite["inertia"]]), model.axes.numel_out(0))
     known = ca.vertcat(z, p, u)
     rows_of = _rows if model.composite.n_instructions() <= LONGEST_CODE else _rows_by_structure
 
@@ -100,22 +108,26 @@ def _dependencies(model: Equations, knowns: Sequence[int], booleans: Set[int]) -
 
     follows = _after_change(model, z, p, c)
     now = rows(
-        {"output": model.state_outputs(follows, u, c, a, 0.0), "derivative": model.state_ode(follows, u, c)}
+        {
+            "output": model.exchange.outputs(follows, u, c, a, 0.0),
+            "derivative": model.exchange.ode(follows, u, c),
+        }
     )
     if model.change is None:
         return now, now | rows({"state": z})
     begun = (
         ca.vertcat(z[:4], model.change.momentum_of(z[4:], c)) if keeps_momentum(model.resolved.scene) else z
     )
-    rate = ca.vertcat(model.ode(z, u, c)[:4], model.state_ode(begun, u, c)[4:])
+    rate = ca.vertcat(model.ode(z, u, c)[:4], model.exchange.ode(begun, u, c)[4:])
     return now, rows({"output": model.outputs(z, u, c, a, 0.0), "derivative": rate, "state": begun})
 
 
 def _after_change(model: Equations, z: ca.SX, p: ca.SX, c: ca.SX) -> ca.SX:
-    """Returns what stands for the states after a change of inputs: its structure tells what they follow from.
+    """Returns an expression whose structure shows what the states depend on after a change of inputs, (7,).
 
-    A state that is the angular momentum is what a change of mass or pose keeps. An angular velocity jumps by
-    what follows from the inputs as they were and are; a dock that opens or closes makes either one jump.
+    Only its structure has a meaning. An angular momentum is kept when a mass or a pose changes. An angular
+    velocity jumps then by an amount that depends on the inputs before and after. When a dock opens or
+    closes, both jump.
     """
     if model.change is None:
         return z

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from supervessel.composite.docks import TooManyWaysError
 from supervessel.composite.resolved import resolve
-from supervessel.equations import composite_at_start
+from supervessel.composite.start import composite_at_start
 from supervessel.problems import SceneError, few_suggestions, key_path, quantity, unknown
 from supervessel.scene.consistency import consistency_problems
 from supervessel.scene.names import misnamed_courses, naming_problems, size_problems

@@ -20,7 +20,7 @@ class Known:
     attitude : (4,), of unit length
     omega    : angular velocity, (3,) [rad/s], body axes
     u        : the inputs that act
-    parts    : those of the composite by name, see `equations.composite_parts`; "principal", moments and axes,
+    parts    : those of the composite by name, see `composite.parts`; "principal", moments and axes,
                (7,), zeros where nobody asks; "error_estimate" [rad]
     inertia  : tensor about the barycentre, (3, 3) [kg m2], body axes
     """

@@ -358,9 +358,9 @@ def test_the_epoch_is_part_of_a_saved_state(fmi, propagator, count):
 def constants_of(instance: Instance, raw: dict[str, Any]) -> bytes:
     """Returns what theta functions need of a state as the epoch, by the functions that C is made of."""
     model, x = equations(scene(raw)), state(instance)
-    [function] = [f for f in model.propagation if f.name() == "free_constants"]
+    [function] = [f for f in model.steps.propagation if f.name() == "free_constants"]
     a = np.array(model.axes(model.composite(p_start(scene(raw))))).ravel()
-    where = model.axes_slices["free"].start
+    where = model.slices.axes["free"].start
     a[where : where + 3] /= 2.0 ** math.frexp(a[where + 2])[1]
     unit = 2.0 ** math.frexp(np.abs(x[4:]).max())[1]
     return np.array(function(np.r_[x[:4], x[4:] / unit], a, unit)).tobytes()

@@ -9,6 +9,7 @@ from supervessel.composite.bodies import Lookup, placed_groups, vessel_body
 from supervessel.composite.inertia import Body, from_upper_triangle, offset_tensor, upper_triangle
 from supervessel.composite.poses import Pose, constant
 from supervessel.composite.resolved import ResolvedScene
+from supervessel.layout import slices_of
 from supervessel.rotation.attitude import quaternion, to_inertial
 from supervessel.scene.inputs import FORCE, vessel_of
 from supervessel.scene.schema import Scene
@@ -48,8 +49,10 @@ ACTIONS: dict[str, Callable[[Scene, str, Placed, ca.SX], Acting]] = {
     "force": _at_point,
     "vessel_torque": _on_vessel,
 }
-"""How inputs act, by their key: scene, owner, poses, barycentre -> what each does. A kind that is not here
-is a torque about the barycentre in body axes as it stands."""
+"""Torque and force of an input that acts, by the input's key, from scene, owner, poses and barycentre.
+
+An input of any other kind is a torque about the barycentre in body axes.
+"""
 
 
 def action_parts(resolved: ResolvedScene, lookup: Lookup, centre: ca.SX) -> dict[str, ca.SX]:
@@ -104,18 +107,22 @@ def _matrix(numbers: ca.SX, number: int) -> ca.SX:
 
 
 SIZES = {"docked": 1, "origin": 3, "centre": 3, "rotation": 9, "rate": 3, "inertia": 6, "spin": 3}
-"""Layout of what c holds of a vessel that outputs are about; zero while it is not docked.
+"""Sizes of the elements of a vessel's part of c; all are zero while the vessel is not docked.
 
-docked, 1 or 0; origin, centre of mass [m] from the barycentre; rotation, column by column, into body axes;
-rate [rad/s] relative to the body axes, in them; inertia [kg m2] about the barycentre; spin [N m s] about it
-of its motion relative to the body axes.
+docked   : 1 or 0
+origin   : of the vessel's axes, from the barycentre [m], body axes
+centre   : the vessel's centre of mass, from the barycentre [m], body axes
+rotation : R_body_vessel, column by column
+rate     : of the vessel relative to the body axes [rad/s], body axes
+inertia  : of the vessel about the composite's barycentre [kg m2], body axes, upper triangle
+spin     : angular momentum about the barycentre of the vessel's motion relative to the body axes [N m s]
 """
 
 
 def vessel_parts(resolved: ResolvedScene, lookup: Lookup, whole: Body) -> dict[str, ca.SX]:
-    """Returns the part of c, (28,), named after each vessel that outputs are about, with a dot before it.
+    """Returns the part of c, (28,), of each vessel that outputs are about, by the vessel's name after a dot.
 
-    whole : all of it as one body
+    whole : the composite as one body
     """
     if not resolved.vessels_shown:
         return {}
@@ -124,51 +131,52 @@ def vessel_parts(resolved: ResolvedScene, lookup: Lookup, whole: Body) -> dict[s
     for name in resolved.vessels_shown:
         pose, attached = where[name]
         body = vessel_body(resolved.scene, name, lookup, Pose(ca.SX.eye(3), ca.SX.zeros(3)))
-        seen = body.seen_from(pose.rotation, pose.origin, pose.velocity, pose.rate)
-        rho = seen.centre - whole.centre
-        inertia = seen.inertia + seen.mass * offset_tensor(rho)
-        spin, rate = ca.SX.zeros(3), ca.SX.zeros(3)
-        if whole.velocity is not None:
-            velocity = ca.SX.zeros(3) if seen.velocity is None else seen.velocity
-            spin = seen.mass * ca.cross(rho, velocity - whole.velocity)
-            spin = spin if seen.spin is None else spin + seen.spin
-            rate = rate if pose.rate is None else pose.rate
-        part = ca.vertcat(
-            1.0,
-            pose.origin - whole.centre,
-            rho,
-            ca.vec(pose.rotation),
-            rate,
-            upper_triangle(inertia),
-            spin,
-        )
+        part = _vessel_part(body, pose, whole)
         parts[f".{name}"] = part if attached is None else attached * part
     return parts
+
+
+def _vessel_part(body: Body, pose: Pose, whole: Body) -> ca.SX:
+    """Returns the part of c, (28,), of a docked vessel, in the layout of SIZES.
+
+    body  : the vessel in its own axes
+    pose  : of the vessel in the root's axes
+    whole : the composite as one body
+    """
+    seen = body.seen_from(pose.rotation, pose.origin, pose.velocity, pose.rate)
+    rho = seen.centre - whole.centre
+    inertia = seen.inertia + seen.mass * offset_tensor(rho)
+    spin, rate = ca.SX.zeros(3), ca.SX.zeros(3)
+    if whole.velocity is not None:
+        velocity = ca.SX.zeros(3) if seen.velocity is None else seen.velocity
+        spin = seen.mass * ca.cross(rho, velocity - whole.velocity)
+        spin = spin if seen.spin is None else spin + seen.spin
+        rate = rate if pose.rate is None else pose.rate
+    origin, R_body_vessel = pose.origin - whole.centre, ca.vec(pose.rotation)
+    return ca.vertcat(1.0, origin, rho, R_body_vessel, rate, upper_triangle(inertia), spin)
 
 
 def vessel_outputs(name: str, part: ca.SX, attitude: ca.SX, omega: ca.SX) -> dict[str, ca.SX]:
     """Returns the outputs of a vessel by name.
 
-    part     : what c holds of it, see SIZES
-    attitude : of the body, (4,)
+    part     : the vessel's part of c, in the layout of SIZES
+    attitude : q_inertial_body, (4,)
     omega    : angular velocity of the body, (3,) [rad/s], body axes
     """
-    pieces, start = {}, 0
-    for key, size in SIZES.items():
-        pieces[key] = part[start : start + size]
-        start += size
-    rotation = ca.reshape(pieces["rotation"], 3, 3)
+    pieces = {key: part[place] for key, place in slices_of(SIZES).items()}
+    R_body_vessel = ca.reshape(pieces["rotation"], 3, 3)
     share = from_upper_triangle(pieces["inertia"]) @ omega + pieces["spin"]
     if pieces["docked"].is_constant():
-        own_attitude = quaternion(rotation)
+        q_body_vessel = quaternion(R_body_vessel)
     else:
         is_docked = pieces["docked"] > 0.5
-        own_attitude = ca.if_else(is_docked, quaternion(ca.if_else(is_docked, rotation, ca.SX.eye(3))), 0.0)
+        R_or_identity = ca.if_else(is_docked, R_body_vessel, ca.SX.eye(3))
+        q_body_vessel = ca.if_else(is_docked, quaternion(R_or_identity), 0.0)
     return {
         f"{name}.origin": pieces["origin"],
         f"{name}.centre_of_mass": pieces["centre"],
-        f"{name}.attitude": own_attitude,
-        f"{name}.angular_velocity": rotation.T @ (omega + pieces["rate"]),
+        f"{name}.attitude": q_body_vessel,
+        f"{name}.angular_velocity": R_body_vessel.T @ (omega + pieces["rate"]),
         f"{name}.angular_momentum": to_inertial(attitude, share),
     }
 

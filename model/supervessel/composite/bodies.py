@@ -14,9 +14,29 @@ from supervessel.composite.inertia import Body, combine, orbiter_moments, placed
 from supervessel.composite.poses import Pose, constant, mated_pose, port_axes, scaled
 from supervessel.composite.resolved import ResolvedScene, RigidGroup
 from supervessel.scene.schema import Scene
+from supervessel.scene.variables import InputVariable
 
 Lookup = Callable[[str, ArrayLike], ca.SX]
 """Takes an input's name without index and the scene's value; returns its symbols, or the constant."""
+
+
+def lookup_in(inputs: Sequence[InputVariable], values: ca.SX) -> Lookup:
+    """Returns the function that takes the name of an input without index to its symbols.
+
+    inputs : the inputs that have symbols; any other name is a constant, the scene's value
+    values : symbols of the inputs, in their order, (n,)
+    """
+    first: dict[str, int] = {}
+    for place, variable in enumerate(inputs):
+        first.setdefault(variable.group, place)
+
+    def lookup(group: str, value: ArrayLike) -> ca.SX:
+        if group not in first:
+            return constant(value)
+        place = first[group]
+        return values[place : place + (inputs[place].kind.elements or 1)]
+
+    return lookup
 
 
 @dataclass(frozen=True)
@@ -40,9 +60,9 @@ class PlacedGroup:
 def composite_body(resolved: ResolvedScene, lookup: Lookup) -> Body:
     """Returns what hangs on the root as one body in the root vessel's axes.
 
-    Vessels that no pose input and no dock input separates form a rigid group. Those of constant mass are
-    combined in the axes of the group's first vessel, so that they have become numbers before the group is
-    placed by the pose that moves it; the others are placed one by one.
+    Vessels between which there is no pose input and no dock input form a rigid group. Its vessels of constant
+    mass are combined in the axes of the group's first vessel, so that they are numbers before the group is
+    placed by the pose that moves it; its other vessels are placed one by one.
     """
     bodies = []
     for number, (group, placed) in enumerate(
@@ -132,7 +152,7 @@ def _chosen(flags: Sequence[ca.SX], poses: Sequence[Pose]) -> tuple[ca.SX, Pose]
 
 
 def _lumped(scene: Scene, group: RigidGroup, lookup: Lookup) -> list[Body]:
-    """Returns the vessels of a group in its axes: those that are constant as one body, before the others."""
+    """Returns a group in its axes: its constant vessels as one body, then each vessel that varies."""
     bodies = [vessel_body(scene, name, lookup, group.inside[name]) for name in group.varying]
     if group.fixed is None:
         return bodies

@@ -1,6 +1,6 @@
 """The composite of a scene of many moving vessels as steps that a loop takes for one vessel after the other.
 
-The same equations in the same order as `docking.composite_body` and `inertia.combine` have for all vessels at
+The same equations in the same order as `bodies.composite_body` and `inertia.combine` have for all vessels at
 once, whose code would grow with the scene; no bit differs from theirs.
 
 Vectors: a pose (12,) is a rotation, column by column, and an origin; a port (9,) position, direction,
@@ -19,14 +19,16 @@ from supervessel.composite.inertia import (
     placed_body,
     upper_triangle,
 )
+from supervessel.composite.parts import body_parts
 from supervessel.composite.poses import Pose, mated_pose, port_axes
-from supervessel.equations import body_parts, derivatives, simplification
+from supervessel.derivatives import derivatives
 from supervessel.scene.schema import Scene
+from supervessel.simplification import simplification
 
 
 @simplification(True)
 def lane_kernels(scene: Scene) -> tuple[ca.Function, ...]:
-    """Returns what is done for several vessels at once, of each the same.
+    """Returns the steps that are taken for several vessels at once.
 
     mated    : parent's port in its axes, child's port -> pose of the child in the parent's axes
     then     : pose of axes, pose in them -> pose in the outer axes
@@ -47,9 +49,13 @@ def lane_kernels(scene: Scene) -> tuple[ca.Function, ...]:
     return tuple(ca.Function(name, arguments, [ca.densify(r)]) for name, (arguments, r) in steps.items())
 
 
+TAKEN_ONCE = ("middle", "finish")
+"""Steps of which C takes the values from `kernels`; of the other steps it takes the derivatives alone."""
+
+
 @simplification(True)
 def kernels(scene: Scene) -> tuple[ca.Function, ...]:
-    """Returns what is done once, and the derivatives of all steps, called loop_...
+    """Returns the steps that are taken once, and the derivatives of all steps; their names begin with loop_.
 
     hang        : pose of the parent's group, parent's port in its axes, child's port -> pose of the child's
                   group
@@ -66,6 +72,17 @@ def kernels(scene: Scene) -> tuple[ca.Function, ...]:
     add         : inertia (6,), mass, seen, centre of the first, middle -> inertia with that body
     finish      : sum, centre of the first, middle, inertia -> c
     """
+    functions: list[ca.Function] = []
+    for step, (arguments, result) in _steps(scene).items():
+        name, results = f"loop_{step}", [ca.densify(result)]
+        if step in TAKEN_ONCE:
+            functions.append(ca.Function(name, arguments, results))
+        functions += derivatives(name, arguments, results)
+    return tuple(functions)
+
+
+def _steps(scene: Scene) -> dict[str, tuple[list[ca.SX], ca.SX]]:
+    """Returns arguments and result of each step; `kernels` says what the steps are."""
     pose, inside = _pose("pose"), _pose("inside")
     parent, child, seen = (ca.SX.sym(name, 9) for name in ("parent", "child", "seen"))
     mass = ca.SX.sym("mass")
@@ -74,7 +91,7 @@ def kernels(scene: Scene) -> tuple[ca.Function, ...]:
     )
     step = mated_pose(_port(parent), _port(child))
     whole = Body(total[0], first + middle, from_upper_triangle(inertia))
-    steps = {
+    return {
         "hang": ([pose, parent, child], _flat(_as_pose(pose).then(step))),
         "hang_inside": (
             [pose, inside, parent, child],
@@ -92,12 +109,6 @@ def kernels(scene: Scene) -> tuple[ca.Function, ...]:
             ca.vertcat(*body_parts(scene, by_convention(scene, whole)).values()),
         ),
     }
-    functions = []
-    for name, (arguments, result) in ((f"loop_{step}", parts) for step, parts in steps.items()):
-        if name in ("loop_middle", "loop_finish"):
-            functions.append(ca.Function(name, arguments, [ca.densify(result)]))
-        functions += derivatives(name, arguments, [ca.densify(result)]).values()
-    return tuple(functions)
 
 
 def _seen_bodies(scene: Scene) -> dict[str, tuple[list[ca.SX], ca.SX]]:

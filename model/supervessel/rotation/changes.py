@@ -5,7 +5,7 @@ leaves with its share, so that the rest keeps its rate; masses and moments chang
 of ports, each keeping rate or momentum as the scene says; what docks brings its momentum along.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import reduce
 
@@ -13,12 +13,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from supervessel.composite.bodies import composite_body
+from supervessel.composite.bodies import composite_body, lookup_in
 from supervessel.composite.inertia import from_upper_triangle, ldl, ldl_solve
 from supervessel.composite.poses import constant
 from supervessel.composite.resolved import ResolvedScene
 from supervessel.rotation.laws import LAWS
-from supervessel.scene.variables import InputVariable
 
 Parts = Mapping[str, ca.SX]
 """Parts of c by name."""
@@ -137,21 +136,3 @@ def _contact_momentum(resolved: ResolvedScene, p: ca.SX, k: ca.SX) -> ca.SX:
 
     spin = composite_body(resolved, at_contact).spin
     return ca.SX.zeros(3) if spin is None else spin
-
-
-def lookup_in(inputs: Sequence[InputVariable], values: ca.SX) -> Callable[[str, ArrayLike], ca.SX]:
-    """Returns the function that takes an input's name without index and the scene's value to its symbols.
-
-    values : those of the inputs
-    """
-    first: dict[str, int] = {}
-    for place, variable in enumerate(inputs):
-        first.setdefault(variable.group, place)
-
-    def lookup(group: str, value: ArrayLike) -> ca.SX:
-        if group not in first:
-            return constant(value)
-        place = first[group]
-        return values[place : place + (inputs[place].kind.elements or 1)]
-
-    return lookup

@@ -55,13 +55,13 @@ class Plant:
         self.scene, self.doublings, self.error_form = scene, doublings, error_form
         self._model = equations(scene)
         inputs = (*self._model.resolved.shaping, *self._model.resolved.contact)
-        start = np.append(p_start(scene), np.zeros(len(self._model.k_names)))
+        start = np.append(p_start(scene), np.zeros(len(self._model.names.k)))
         constants = settled(fixed, inputs)
         free = [i for i in range(len(inputs)) if i not in constants]
         self._p_variables = [inputs[i] for i in free]
         self.p_names = tuple(variable.name for variable in self._p_variables)
         self.u_variables = self._model.resolved.acting
-        self.u_names, self.x_names = self._model.u_names, X_NAMES
+        self.u_names, self.x_names = self._model.names.u, X_NAMES
         self.y_names = tuple(v.name for v in self._model.resolved.outputs if not v.kind.of_step)
         self.p = ca.SX.sym("p", len(free))
         self.u = ca.SX.sym("u", len(self.u_names))
@@ -75,7 +75,7 @@ class Plant:
         # CasADi turns x * (1/y) into x/y when the two meet in one graph. The FMU computes 1/y once for each
         # change of inertia, so the twin must multiply by it as well to give the same last bit.
         with simplification(False):
-            self._c = self._model.composite(self._inputs[: len(self._model.p_names)])
+            self._c = self._model.composite(self._inputs[: len(self._model.names.p)])
             self._a = self._model.axes(self._c)
 
     @cached_property
@@ -144,7 +144,7 @@ class Plant:
             45.02
         """
         with simplification(False):
-            fastest = self._model.fastest_square(self.x, self.u, self._c)
+            fastest = self._model.steps.fastest_square(self.x, self.u, self._c)
             longest = self.scene.rotation.max_angle_step / ca.sqrt(fastest)
         return self._function("longest_step", self._at, {"h_max": longest}, unit=False)
 
@@ -175,7 +175,7 @@ class Plant:
         """
         with simplification(False):
             y = self._model.outputs(self.x, self.u, self._c, self._a, 0.0)
-        shown = [i for i, name in enumerate(self._model.y_names) if name in self.y_names]
+        shown = [i for i, name in enumerate(self._model.names.y) if name in self.y_names]
         return self._function("outputs", self._at, {"y": y[shown]}, unit=False)
 
     @cached_property
@@ -194,7 +194,7 @@ class Plant:
             True
         """
         model, p_next = self._model, ca.SX.sym("p_next", self.p.numel())
-        shaping, omega = len(model.p_names), self.x[4:]
+        shaping, omega = len(model.names.p), self.x[4:]
         after = ca.substitute(self._inputs, self.p, p_next)
         if model.change is not None:
             inputs = (omega, self._inputs[:shaping], after[:shaping], after[shaping:])
@@ -249,12 +249,12 @@ class Plant:
         model = self._model
 
         def free(x: ca.SX) -> ca.SX:
-            axes = a[model.axes_slices["free"]]
+            axes = a[model.slices.axes["free"]]
             end = free_step(x, axes[:3], ca.reshape(axes[3:], 3, 3), self.h, self.doublings)
             return end + _zero_without_derivative_at_equal(axes[:3])
 
         def stepped(x: ca.SX) -> ca.SX:
-            return model.step.call([x, self.u, c, self.h])[0]
+            return model.steps.step.call([x, self.u, c, self.h])[0]
 
         if model.plan.method is None:
             pushed = ca.sumsqr(self.u) > 0.0 if self.u_names else ca.SX(0.0)

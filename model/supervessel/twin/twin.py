@@ -270,8 +270,8 @@ class Twin(Plant):
     @cached_property
     def _spin(self) -> ca.SX:
         """Angular momentum, (3,), of what moves relative to the body axes, as far as the law knows it."""
-        known = "momentum" in self._model.slices and LAWS[self.scene.rotation.law].gyroscopic_term
-        return self._c[self._model.slices["momentum"]][:3] if known else ca.SX.zeros(3)
+        known = "momentum" in self._model.slices.composite and LAWS[self.scene.rotation.law].gyroscopic_term
+        return self._c[self._model.slices.composite["momentum"]][:3] if known else ca.SX.zeros(3)
 
     @cached_property
     def _turning(self) -> ca.SX:

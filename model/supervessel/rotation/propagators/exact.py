@@ -25,12 +25,12 @@ def free_functions(size: int, where: slice) -> list[ca.Function]:
     Rates and moments must be about 1: the caller scales them by powers of two.
     """
     x, a, t, share = (ca.SX.sym(*s) for s in (("x", STATE_SIZE), ("a", size), ("t", 1), ("share", 1)))
-    moments, to_body = a[where][:3], ca.reshape(a[where][3:], 3, 3)
-    omega = to_body.T @ x[4:]
+    moments, R_body_principal = a[where][:3], ca.reshape(a[where][3:], 3, 3)
+    omega = R_body_principal.T @ x[4:]
     begun = free_motion.start(moments, omega, t, share)
     v, k = ca.SX.sym("v", free_motion.VARYING), ca.SX.sym("k", begun.numel() - free_motion.VARYING)
     s = ca.vertcat(v, k)
-    end = _in_body(x, to_body, *free_motion.finish(moments, omega, t, s))
+    end = _in_body(x, R_body_principal, *free_motion.finish(moments, omega, t, s))
     return [
         ca.Function(
             "free_phase", [x, a, t], [free_motion.phase(moments, omega, t)], ["x", "a", "t"], ["angle"]
@@ -57,32 +57,33 @@ def free_functions_of_start(size: int, where: slice) -> list[ca.Function]:
     """
     x, a, scale, t = (ca.SX.sym(*s) for s in (("x", STATE_SIZE), ("a", size), ("scale", 1), ("t", 1)))
     k = ca.SX.sym("k", theta.CONSTANTS)
-    moments, to_body = a[where][:3], ca.reshape(a[where][3:], 3, 3)
-    found = theta.constants(x, moments, to_body, scale)
+    moments, R_body_principal = a[where][:3], ca.reshape(a[where][3:], 3, 3)
+    found = theta.constants(x, moments, R_body_principal, scale)
     return [
         ca.Function("free_constants", [x, a, scale], [found], ["x", "a", "scale"], ["k"]),
         ca.Function("free_at", [k, t], [theta.at(k, t)], ["k", "t"], ["x"]),
     ]
 
 
-def free_step(state: ca.SX, moments: ca.SX, to_body: ca.SX, time: ca.SX, doublings: int) -> ca.SX:
+def free_step(state: ca.SX, moments: ca.SX, R_body_principal: ca.SX, time: ca.SX, doublings: int) -> ca.SX:
     """Returns the state (attitude, angular velocity), (7,), after free motion.
 
-    moments   : principal, (3,), ascending; any unit
-    to_body   : R_body_principal, (3, 3)
-    time      : [s]
-    doublings : room for that many; NaN where more are needed, or the body turns by more than LARGEST_TURN
+    moments          : principal, (3,), ascending; any unit
+    R_body_principal : (3, 3), its columns are the principal axes
+    time             : [s]
+    doublings        : largest number of doublings; the state is NaN where more are needed, or the body turns
+                       by more than LARGEST_TURN
     """
-    omega = to_body.T @ state[4:]
+    omega = R_body_principal.T @ state[4:]
     fastest = ca.fmax(ca.mmax(ca.fabs(omega)), SLOWEST)
     turn, end = free_motion.free_turn(moments / moments[2], omega / fastest, time * fastest, doublings)
-    return _in_body(state, to_body, turn, fastest * end)
+    return _in_body(state, R_body_principal, turn, fastest * end)
 
 
-def _in_body(state: ca.SX, to_body: ca.SX, turn: ca.SX, omega_end: ca.SX) -> ca.SX:
+def _in_body(state: ca.SX, R_body_principal: ca.SX, turn: ca.SX, omega_end: ca.SX) -> ca.SX:
     """Returns the state after a turn given in principal axes, with the angular velocity there."""
-    turn_body = ca.vertcat(turn[0], to_body @ turn[1:])
-    return ca.vertcat(unit(product(state[:4], turn_body)), to_body @ omega_end)
+    turn_body = ca.vertcat(turn[0], R_body_principal @ turn[1:])
+    return ca.vertcat(unit(product(state[:4], turn_body)), R_body_principal @ omega_end)
 
 
 PROPAGATOR = Propagator(

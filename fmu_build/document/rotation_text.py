@@ -1,0 +1,97 @@
+"""What the page says of the rotation: equations of the laws, energy and momentum, what changes keep; HTML."""
+
+from supervessel.scene.schema import Law, Scene
+
+PRIME, MINUS, TIMES = "\N{PRIME}", "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}"
+
+LAWS: dict[Law, tuple[str, str]] = {
+    "none": (
+        f"<i>ω</i>{PRIME} = 0",
+        "The angular velocity is given and kept; the inertia tensor has no effect on it.",
+    ),
+    "decoupled": (
+        f"<i>J</i><sub>ii</sub> <i>ω</i><sub>i</sub>{PRIME} = <i>M</i><sub>i</sub>, i = x, y, z",
+        "Each axis for itself: no gyroscopic term, no products of inertia. For slow rates and short spans.",
+    ),
+    "principal": (
+        f"<i>J</i><sub>xx</sub> <i>ω</i><sub>x</sub>{PRIME} = <i>M</i><sub>x</sub> {MINUS} "
+        f"(<i>J</i><sub>zz</sub> {MINUS} <i>J</i><sub>yy</sub>) <i>ω</i><sub>y</sub> <i>ω</i><sub>z</sub>, "
+        "and so on cyclically",
+        "Euler's equations with the diagonal of the tensor, without products of inertia ([CV] eq. (2)).",
+    ),
+    "tensor": (
+        f"<i>J ω</i>{PRIME} = <i>M</i> {MINUS} <i>ω</i> {TIMES} <i>J ω</i>",
+        "Euler's equations with the full inertia tensor ([CV] eq. (1)).",
+    ),
+}
+"""Equation and description of each rotation law, HTML."""
+
+H = "<i>h</i>"
+RHO = "<i>\N{GREEK SMALL LETTER RHO}</i><sub>j</sub>"
+
+SPINNING_LAWS: dict[Law, str] = {
+    "principal": f"{LAWS['principal'][0]}, with <i>J ω</i> + {H} in place of <i>J ω</i>",
+    "tensor": f"<i>J ω</i>{PRIME} = <i>M</i> {MINUS} <i>ω</i> {TIMES} (<i>J ω</i> + {H})",
+}
+"""Equations of the laws that the momentum h of moving ports enters, HTML; in the others it does nothing."""
+
+KEPT_BY = {
+    ("mass", "rate"): "When a mass or a moment changes, the <b>angular velocity is kept</b>: mass leaves or "
+    "arrives moving with the body.",
+    ("mass", "momentum"): "When a mass or a moment changes, the <b>angular momentum is kept</b>: mass moves "
+    "inside the assembly.",
+    ("pose", "rate"): "When a port's pose changes, the <b>angular velocity is kept</b>. For parts that are "
+    "moved inside the assembly that is a modelling error: the angular momentum is then not conserved.",
+    ("pose", "momentum"): "When a port's pose changes, the <b>angular momentum is kept</b>: the parts are "
+    "moved inside the assembly, and the angular velocity follows.",
+}
+"""What changes keep, HTML."""
+
+DOCKING = (
+    "Docks open and close between the steps of co-simulation, or in event mode. What undocks leaves with its "
+    "share of the momentum: the angular velocity of the rest is kept. What docks brings its own along: the "
+    "momentum of both parts is conserved, by the full inertia tensor under every law but none. The part of "
+    "the second port comes with the velocity and the rate, relative to the first port, that are inputs; zero "
+    "is a matched approach. A vessel that is not docked to the root's part, even through others, has no "
+    "effect on anything; its own outputs are zero."
+)
+
+
+def law_equation(scene: Scene) -> str:
+    """Returns the equation of a scene's rotation law."""
+    law = scene.rotation.law
+    own, _ = LAWS[law]
+    return SPINNING_LAWS.get(law, own) if scene.inputs.motion else own
+
+
+def law_text(scene: Scene) -> str:
+    """Returns what a scene's rotation law leaves out, and where it serves."""
+    return LAWS[scene.rotation.law][1]
+
+
+def energy_and_momentum(scene: Scene) -> str:
+    """Returns the equations of kinetic energy and angular momentum."""
+    own = f"<i>J ω</i> + {H}" if scene.inputs.motion else "<i>J ω</i>"
+    closed = f"({own})" if scene.inputs.motion else own
+    text = (
+        '<p class="equation">kinetic energy ½ <i>ω</i> · <i>J ω</i>, &#160;\n'
+        f"angular momentum <i>R</i>(<i>q</i>) {closed}</p>"
+    )
+    if scene.inputs.motion:
+        text += (
+            f"\n<p>{H} is the angular momentum of the parts that moving ports carry, relative to body axes: "
+            f"Σ <i>m</i><sub>j</sub> {RHO} {TIMES} {RHO}{PRIME} + <i>R</i><sub>j</sub> "
+            "<i>J</i><sub>j</sub> <i>R</i><sub>j</sub><sup>T</sup> <i>ω</i><sub>j</sub>, with the rate "
+            "<i>ω</i><sub>j</sub> of each relative to body axes.</p>"
+        )
+    return text
+
+
+def what_changes_keep(scene: Scene) -> str:
+    """Returns what a change of inputs keeps, the angular velocity or the angular momentum."""
+    texts = [KEPT_BY[kind, kept] for kind, kept in scene.keeps.items()]
+    if len(texts) == 2:
+        texts.append("Where both change at one instant, masses come first.")
+    if scene.inputs.docked:
+        texts.append(DOCKING)
+    return "\n".join(f"<p>{text}</p>" for text in texts) or "<p>No input of this scene changes them.</p>"

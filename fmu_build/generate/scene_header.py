@@ -1,0 +1,156 @@
+"""scene.h: the counts, places and limits that the C layer must know of a scene."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import casadi as ca
+
+from fmu_build.generate.change_tables import change_constants
+from fmu_build.generate.vessel_loop import Tables, loop_constants
+from fmu_build.interface.variable_table import TableEntry
+from supervessel.equations import Equations
+from supervessel.rotation.propagators.free_motion import FIRST_ANGLE, LARGEST_TURN
+from supervessel.rotation.propagators.theta import CONSTANTS
+from supervessel.scene.schema import Scene
+
+CHOICES = {
+    "STEPS_NONE": 0,
+    "STEPS_BY_ANGLE": 1,
+    "STEPS_BY_ERROR": 2,
+    "STEPS_BY_SERIES": 3,
+    "FREE_NEVER": 0,
+    "FREE_ALWAYS": 1,
+    "FREE_BETWEEN_KICKS": 2,
+    "FREE_WHILE_FREE": 3,
+}
+"""What the C layer compiles for a plan (`supervessel.rotation.propagators`), as the preprocessor sees it."""
+
+
+def scene_header(
+    model: Equations,
+    entries: Sequence[TableEntry],
+    functions: Iterable[ca.Function],
+    loop: Tables | None,
+) -> str:
+    """Returns scene.h.
+
+    entries   : the variable table
+    functions : the functions of model.c
+    loop      : tables of a composite that a loop puts together; None for straight code
+    """
+    constants = {
+        **_variables(model, entries),
+        "COMPOSITE_COUNT": model.composite.numel_out(0),
+        **_axes_and_free_motion(model),
+        **_parts_of_composite(model),
+        **_rules(model.resolved.scene),
+        **_work_arrays(functions, loop),
+    }
+    macros = {
+        "AXES_COUNT": model.axes.numel_out(0),
+        **change_constants(model),
+        **loop_constants(loop),
+        **_plan(model),
+        **_limits(model.resolved.scene),
+    }
+    return (
+        "/* Generated: what the C layer must know of the scene. */\n"
+        "#ifndef SCENE_H\n#define SCENE_H\n\n"
+        f"enum {{\n{_lines('    {} = {},', constants)}\n}};\n\n"
+        "/* What bounds a step, and when free motion is used. */\n"
+        f"{_lines('#define {} {}', CHOICES)}\n\n"
+        f"{_lines('#define {} {}', macros)}\n\n"
+        "#endif\n"
+    )
+
+
+def _variables(model: Equations, entries: Sequence[TableEntry]) -> dict[str, int]:
+    """Returns how many variables of each kind there are, and the value reference of the first of each."""
+    references = {entry.variable.name: entry.reference for entry in entries}
+    p, k, u = len(model.names.p), len(model.names.k), len(model.names.u)
+    return {
+        "VARIABLE_COUNT": len(entries),
+        "INPUT_P_COUNT": p,
+        "INPUT_K_COUNT": k,
+        "INPUT_U_COUNT": u,
+        "REFERENCE_TIME": 0,
+        "REFERENCE_P": 1,
+        "REFERENCE_CONTACT": 1 + p,
+        "REFERENCE_TORQUE": 1 + p + k,
+        "REFERENCE_RATE_START": references["angular_velocity_start[1]"],
+        "REFERENCE_ATTITUDE_START": references["attitude_start[1]"],
+        "REFERENCE_OUTPUTS": 1 + p + k + u + 7,
+        "OUTPUT_COUNT": len(model.names.y),
+        "REFERENCE_STATES": references["state.attitude[1]"],
+        "REFERENCE_DERIVATIVES": references["der(state.attitude[1])"],
+        "STATE_COUNT": len(model.names.z),
+    }
+
+
+def _axes_and_free_motion(model: Equations) -> dict[str, int]:
+    """Returns where principal moments and axes stand in a, and how many numbers free motion carries along."""
+    axes = model.slices.axes
+    begun = [function for function in model.steps.propagation if function.name() == "free_start"]
+    return {
+        "AXES_FREE": axes["free"].start if "free" in axes else 0,
+        "AXES_SERIES": axes["series"].start if "series" in axes else 0,
+        "FREE_VARYING": begun[0].numel_out(0) if begun else 0,
+        "FREE_CONSTANT": begun[0].numel_out(1) if begun else 0,
+        "FREE_START": CONSTANTS,
+    }
+
+
+def _parts_of_composite(model: Equations) -> dict[str, int]:
+    """Returns where the parts of c stand that the C layer reads."""
+    read = ("mass", "inertia", "margins", "law")
+    return {f"COMPOSITE_{name.upper()}": model.slices.composite[name].start for name in read}
+
+
+def _rules(scene: Scene) -> dict[str, int]:
+    """Returns what the C layer checks of a composite.
+
+    LAW_TURNS       : whether the law needs a positive definite tensor
+    TRIANGLE_JUDGED : whether moments must satisfy the triangle inequality
+    """
+    return {
+        "LAW_TURNS": int(scene.rotation.law != "none"),
+        "TRIANGLE_JUDGED": int(scene.convention == "rigid_body"),
+    }
+
+
+def _work_arrays(functions: Iterable[ca.Function], loop: Tables | None) -> dict[str, int]:
+    """Returns sizes of the work arrays, each enough for any of the functions; no array of C is empty."""
+    sizes = [(f.sz_arg(), f.sz_res(), f.sz_iw(), f.sz_w()) for f in functions]
+    arguments, results, integers, reals = (max(1, *column) for column in zip(*sizes, strict=True))
+    return {
+        "WORK_ARG": arguments,
+        "WORK_RES": results,
+        "WORK_INT": integers,
+        "WORK_REAL": reals + (loop.work if loop else 0),
+    }
+
+
+def _plan(model: Equations) -> dict[str, object]:
+    """Returns the method of co-simulation: what controls its steps, when motion is free, its numbers."""
+    method = model.plan.method
+    return {
+        "STEPS": f"STEPS_BY_{method.control.upper()}" if method else "STEPS_NONE",
+        "FREE": f"FREE_{model.plan.free.upper().replace(' ', '_')}",
+        "ERROR_EXPONENT": model.steps.error_exponent,
+        "SAFETY": repr(method.safety if method else 1.0),
+        "PRODUCT_COUNT": model.product_count,
+    }
+
+
+def _limits(scene: Scene) -> dict[str, str]:
+    """Returns the limits that steps and free motion keep to."""
+    rotation = scene.rotation
+    return {
+        "TOLERANCE": repr(rotation.tolerance),
+        "MAX_ANGLE_STEP": f"{rotation.max_angle_step!r} /* largest angle of a sub-step [rad] */",
+        "FIRST_ANGLE": f"{FIRST_ANGLE!r} /* up to which free motion is a series [rad] */",
+        "LARGEST_TURN": f"{LARGEST_TURN!r} /* up to which free motion is followed [rad] */",
+    }
+
+
+def _lines(form: str, values: Mapping[str, object]) -> str:
+    return "\n".join(form.format(name, value) for name, value in values.items())

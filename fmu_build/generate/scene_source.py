@@ -1,0 +1,79 @@
+"""scene.c: the variable table with start values and checks, and the token."""
+
+from collections.abc import Mapping, Sequence
+
+from fmu_build.interface.variable_table import TableEntry
+from supervessel.scene.variables import InputVariable, OutputVariable, Variable
+
+
+def scene_source(entries: Sequence[TableEntry], token: str, changing: bool) -> str:
+    """Returns scene.c.
+
+    token    : instantiation token
+    changing : whether a change of inputs changes the states
+    """
+    needs = {entry.reference: _needs(entry, changing) for entry in entries}
+    typed = any(entry.variable.boolean for entry in entries)
+    rows = "\n".join(f"    {_row(entry, needs, typed)}," for entry in entries)
+    checks = [(entry.reference, check) for entry in entries if (check := _check(entry)) != "CHECK_NONE"]
+    judged = "\n".join(f"    {{{reference}, {check}}}," for reference, check in [*checks, (0, "CHECK_NONE")])
+    return (
+        "/* Generated: the scene's variables, by value reference. */\n"
+        '#include "changes.h"\n\n'
+        f"const Variable VARIABLES[VARIABLE_COUNT] = {{\n{rows}\n}};\n\n"
+        f"const Judged JUDGED[] = {{\n{judged}\n}};\n\n"
+        f'const char MODEL_TOKEN[] = "{token}";\n'
+    )
+
+
+def _needs(entry: TableEntry, changing: bool) -> frozenset[str]:
+    """Returns what must be up to date before anything that depends on a variable can be read.
+
+    The names are flags of the C layer, without FOLLOWS_.
+    """
+    if entry.role == "state" and "attitude" in entry.variable.name:
+        return frozenset({"STATES", "ATTITUDE"})
+    if entry.role == "state":
+        return frozenset({"STATES", "COMPOSITE"} if changing else {"STATES"})
+    if isinstance(entry.variable, InputVariable) and entry.variable.part == "shape":
+        return frozenset({"COMPOSITE"})
+    return frozenset()
+
+
+def _shows_axes(variable: Variable) -> bool:
+    """Whether a variable shows principal moments or axes."""
+    return isinstance(variable, OutputVariable) and variable.kind.axes
+
+
+def _row(entry: TableEntry, needs: Mapping[int, frozenset[str]], typed: bool) -> str:
+    """Returns a row of the table.
+
+    needs : by value reference, what `_needs` returns of each variable
+    typed : whether there are variables of more than one type
+    """
+    variable = entry.variable
+    own = {
+        "output": frozenset({"OUTPUTS", "AXES"} if _shows_axes(variable) else {"OUTPUTS"}),
+        "derivative": frozenset({"RATES"}),
+        "state": needs[entry.reference],
+    }
+    flags = sorted(own.get(entry.role, frozenset()).union(*(needs[d.reference] for d in entry.dependencies)))
+    fields = [
+        f'"{variable.name}"',
+        f'"{variable.unit}"',
+        repr(variable.start or 0.0),
+        repr(variable.nominal),
+        f"ROLE_{entry.role.upper()}",
+        " | ".join(f"FOLLOWS_{flag}" for flag in flags) or "0",
+    ]
+    if typed:
+        fields.append("TYPE_BOOLEAN" if variable.boolean else "TYPE_NUMBER")
+    return "{" + ", ".join(fields) + "}"
+
+
+def _check(entry: TableEntry) -> str:
+    """Returns the check that a set of a variable asks for; of several elements the first one names it."""
+    variable = entry.variable
+    if isinstance(variable, InputVariable) and variable.element == 0 and variable.kind.judge:
+        return f"CHECK_{variable.kind.judge}"
+    return "CHECK_NONE"

@@ -1,0 +1,122 @@
+"""The vector c of everything that follows from the inputs that shape the composite, p: its parts and layout.
+
+c begins with the parts of COMPOSITE_SIZES; `composite_parts` says what follows them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import casadi as ca
+
+from supervessel.composite.actions import action_parts, vessel_parts
+from supervessel.composite.bodies import composite_body, lookup_in
+from supervessel.composite.inertia import Body, ldl, ldl_inverse, upper_triangle
+from supervessel.composite.resolved import ResolvedScene
+from supervessel.layout import slices_of, stacked
+from supervessel.rotation.laws import LAWS
+from supervessel.scene.numbers import EPSILON
+from supervessel.scene.reuse import reused
+from supervessel.scene.schema import Scene
+
+COMPOSITE_SIZES = {"mass": 1, "barycentre": 3, "inertia": 6, "pmi": 3, "margins": 3}
+"""Sizes of the parts with which every c begins.
+
+mass       : [kg]
+barycentre : [m], in the root vessel's axes
+inertia    : about the barycentre [kg m2], body axes: upper triangle xx, yy, zz, xy, xz, yz
+pmi        : mass-normalised diagonal moments [m2]
+margins    : pivots of J = L D L^T [kg m2], each less what rounding may leave of a pivot that is zero; all are
+             positive where the tensor is positive definite as far as doubles can tell
+"""
+
+PIVOT_SLACK = 16.0 * EPSILON
+"""What rounding may leave of a pivot that is zero, over the element J_kk that the pivot was taken from.
+
+The elements of a composite tensor are each off by a few u of sqrt(J_ii J_jj), which bounds |J_ij|. So the
+second pivot of L D L^T is off by a few u of J_22, and the third by a few u of J_33 J_22/d_2: what the second
+row takes from the third pivot is divided by the second row's own pivot d_2.
+"""
+
+
+@dataclass(frozen=True)
+class CompositeGraph:
+    """The composite of a scene in CasADi symbols.
+
+    p      : the inputs that shape the composite, symbols, (n,)
+    c      : all parts as an expression of p, (m,)
+    slices : where each part stands in c
+    """
+
+    p: ca.SX
+    c: ca.SX
+    slices: Mapping[str, slice]
+
+    def parts(self, symbols: ca.SX) -> dict[str, ca.SX]:
+        """Returns the parts by name, of symbols that stand for c; elements that are constant are numbers."""
+        elements = zip(ca.vertsplit(self.c), ca.vertsplit(symbols), strict=True)
+        known = ca.vertcat(*(own if own.is_constant() else symbol for own, symbol in elements))
+        return {name: known[place] for name, place in self.slices.items()}
+
+
+def composite_slices() -> dict[str, slice]:
+    """Returns where the parts stand with which every c begins."""
+    return slices_of(COMPOSITE_SIZES)
+
+
+@reused
+def composite_graph(resolved: ResolvedScene) -> CompositeGraph:
+    """Returns the composite of a scene; the check of a scene and its equations share it."""
+    p = ca.SX.sym("p", len(resolved.shaping))
+    slices, c = stacked(composite_parts(resolved, p))
+    return CompositeGraph(p, c, slices)
+
+
+def composite_parts(resolved: ResolvedScene, p: ca.SX) -> dict[str, ca.SX]:
+    """Returns the parts of c by name as expressions of p.
+
+    The parts of COMPOSITE_SIZES come first. Then, each where the scene has it:
+
+    law           : the numbers that the rotation law needs, see `rotation.laws`
+    momentum      : (4,), where ports move: angular momentum h, (3,) [N m s], of the parts that move relative
+                    to the body axes, and the square, [rad2/s2], of a bound of |J^-1 (omega x h)|/|omega|
+    moment, force : see `composite.actions.action_parts`
+    .NAME         : of the vessel NAME, see `composite.actions.vessel_parts`
+    """
+    lookup = lookup_in(resolved.shaping, p)
+    body = composite_body(resolved, lookup)
+    parts = body_parts(resolved.scene, body)
+    parts |= action_parts(resolved, lookup, body.centre) | vessel_parts(resolved, lookup, body)
+    return {name: ca.densify(part) for name, part in parts.items()}
+
+
+def body_parts(scene: Scene, body: Body) -> dict[str, ca.SX]:
+    """Returns the parts of c that follow from the composite as one body.
+
+    body : the composite in the root vessel's axes
+    """
+    J, law = body.inertia, scene.rotation.law
+    may_be_point = law == "none"  # the one law that takes a mass point, whose moments are zero
+    lower, pivots = ldl(J, singular=may_be_point)
+    parts = {
+        "mass": body.mass,
+        "barycentre": body.centre,
+        "inertia": upper_triangle(J),
+        "pmi": ca.diag(J) / body.mass,
+        "margins": _margins(J, pivots, may_be_point),
+        "law": LAWS[law].prepare(J),
+    }
+    if body.spin is not None:
+        bound = ca.SX(0.0) if may_be_point else ca.trace(ldl_inverse(lower, pivots))
+        parts["momentum"] = ca.vertcat(body.spin, ca.sumsqr(body.spin) * bound * bound)
+    return {name: ca.densify(part) for name, part in parts.items()}
+
+
+def _margins(inertia: ca.SX, pivots: ca.SX, may_be_point: bool) -> ca.SX:
+    """Returns by how much the pivots of a tensor exceed what rounding leaves of zero, (3,) [kg m2]."""
+    J = inertia
+    divisor = ca.if_else(pivots[1] == 0.0, 1.0, pivots[1]) if may_be_point else pivots[1]
+    return ca.vertcat(
+        pivots[0],
+        pivots[1] - PIVOT_SLACK * J[1, 1],
+        pivots[2] - PIVOT_SLACK * (J[2, 2] * (J[1, 1] / divisor)),
+    )

@@ -1,0 +1,61 @@
+"""Directional derivatives of CasADi expressions, forward and reverse, as functions."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+
+from supervessel.layout import split
+
+
+@dataclass(frozen=True)
+class GivenDerivative:
+    """A quantity whose derivative is given in closed form, so that CasADi need not differentiate it.
+
+    value    : symbols of the quantity, (n,); it depends on the last argument of what is differentiated
+    small    : symbols of a small change of that argument
+    response : the change of the quantity, (n,), that this small change makes; linear in `small`
+    """
+
+    value: ca.SX
+    small: ca.SX
+    response: ca.SX
+
+
+def derivatives(
+    name: str, arguments: Sequence[ca.SX], results: Sequence[ca.SX], given: GivenDerivative | None = None
+) -> tuple[ca.Function, ca.Function]:
+    """Returns the functions NAME_forward and NAME_reverse.
+
+    NAME_forward : arguments, then a small change of each -> the change of each result
+    NAME_reverse : arguments, then a weight of each result -> the weight of each argument
+    given        : a quantity in the results with a derivative of its own; its value is one more argument of
+                   both functions, after the others, without a change or weight
+    """
+    together, changed = ca.vertcat(*arguments), ca.vertcat(*results)
+    seeds = [ca.SX.sym(f"d{i}", argument.numel()) for i, argument in enumerate(arguments)]
+    weights = [ca.SX.sym(f"w{i}", result.numel()) for i, result in enumerate(results)]
+    forward = ca.jtimes(changed, together, ca.vertcat(*seeds))
+    reverse = ca.jtimes(changed, together, ca.vertcat(*weights), True)
+    known = list(arguments)
+    if given is not None:
+        known.append(given.value)
+        forward += _forward_through(given, changed, seeds[-1])
+        others = together.numel() - arguments[-1].numel()
+        reverse += ca.vertcat(ca.SX.zeros(others), _reverse_through(given, changed, ca.vertcat(*weights)))
+    forward, reverse = ca.densify(forward), ca.densify(reverse)
+    return (
+        ca.Function(f"{name}_forward", known + seeds, split(forward, results)),
+        ca.Function(f"{name}_reverse", known + weights, split(reverse, arguments)),
+    )
+
+
+def _forward_through(given: GivenDerivative, changed: ca.SX, seed: ca.SX) -> ca.SX:
+    """Returns the change of the results that reaches them through the given quantity."""
+    return ca.jtimes(changed, given.value, ca.substitute(given.response, given.small, seed))
+
+
+def _reverse_through(given: GivenDerivative, changed: ca.SX, weights: ca.SX) -> ca.SX:
+    """Returns the weight of the last argument that comes from the results through the given quantity."""
+    weight_of_value = ca.jtimes(changed, given.value, weights, True)
+    return ca.jtimes(given.response, given.small, weight_of_value, True)

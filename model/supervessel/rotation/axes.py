@@ -1,0 +1,77 @@
+"""The vector a of principal moments and axes that a scene needs: its parts, and how it changes with c."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import casadi as ca
+
+from supervessel.composite.resolved import ResolvedScene
+from supervessel.derivatives import GivenDerivative
+from supervessel.layout import stacked
+from supervessel.rotation.attitude import rotation_matrix
+from supervessel.rotation.laws import LAWS, principal_products
+from supervessel.rotation.principal import principal, principal_forward, quaternion
+from supervessel.rotation.propagators import Plan
+
+
+@dataclass(frozen=True)
+class AxesGraph:
+    """Principal moments and axes in CasADi symbols.
+
+    a      : all parts as an expression of c, (n,); empty where the scene needs none
+    slices : where each part stands in a
+    """
+
+    a: ca.SX
+    slices: Mapping[str, slice]
+
+
+def axes_graph(resolved: ResolvedScene, plan: Plan, inertia: ca.SX, products: ca.SX) -> AxesGraph:
+    """Returns the principal moments and axes that a scene's outputs and propagation need.
+
+    inertia  : of the composite, (3, 3) [kg m2], body axes
+    products : the law's map of products of rates, see `rotation.steps.map_of_products`
+
+    principal : (7,), where outputs show it: moments [kg m2], ascending, and q_body_principal
+    free      : (12,), where free motion is exact: moments of the tensor that the law turns freely, and
+                R_body_principal, column by column
+    series    : for Taylor steps: the factors, (3,), that take products of two rates to the acceleration in
+                principal axes; then, unless these axes are the body's, R_body_principal, (9,)
+    """
+    rotation = resolved.scene.rotation
+    shown = any(kind.axes for kind, _ in resolved.output_kinds)
+    in_series = plan.method is not None and plan.method.control == "series"
+    series_turn = in_series and products.size2() > 3
+    parts: dict[str, ca.SX] = {}
+    if plan.free != "never" or series_turn or (shown and rotation.law == "tensor"):
+        moments, R_body_principal = principal(LAWS[rotation.law].turning(inertia))
+    if shown:
+        own = (moments, R_body_principal) if rotation.law == "tensor" else principal(inertia)
+        parts["principal"] = ca.vertcat(own[0], quaternion(own[1]))
+    if plan.free != "never":
+        parts["free"] = ca.vertcat(moments, ca.vec(R_body_principal))
+    if series_turn:
+        parts["series"] = ca.vertcat(principal_products(moments), ca.vec(R_body_principal))
+    elif in_series:
+        parts["series"] = ca.diag(products) if products.numel() else ca.SX(0, 1)
+    slices, a = stacked(parts)
+    return AxesGraph(a, slices)
+
+
+def axes_derivative(inertia: ca.SX, c: ca.SX, a: ca.SX, slices: Mapping[str, slice]) -> GivenDerivative:
+    """Returns how the moments and axes that outputs show change with the composite.
+
+    inertia : (3, 3) [kg m2], an expression of c
+    c, a    : symbols of the composite, of its moments and axes
+    slices  : where the parts of a stand
+    The change is formed at the moments and axes in a: CasADi never differentiates how they were found. The
+    parts of a that outputs do not show are given no change.
+    """
+    dc = ca.SX.sym("dc", c.numel())
+    da = ca.SX.zeros(a.numel())
+    if "principal" in slices:
+        place = slices["principal"]
+        moments, R_body_principal = a[place][:3], rotation_matrix(a[place][3:])
+        change = ca.jtimes(inertia, c, dc)
+        da[place] = ca.vertcat(*principal_forward(moments, R_body_principal, change))
+    return GivenDerivative(a, dc, da)

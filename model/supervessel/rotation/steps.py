@@ -1,0 +1,106 @@
+"""Steps in time as functions: a scene's method, how long its steps may be, and exact free motion."""
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from supervessel.rotation.axes import AxesGraph
+from supervessel.rotation.dynamics import Dynamics
+from supervessel.rotation.propagators import PROPAGATORS, Plan
+from supervessel.rotation.propagators.bound import fastest_square
+from supervessel.rotation.propagators.exact import free_functions, free_functions_of_start
+from supervessel.rotation.propagators.method import Step, StepSymbols
+from supervessel.scene.schema import Scene
+
+
+@dataclass(frozen=True)
+class StepFunctions:
+    """How a scene goes on in time; x is (attitude, angular velocity), u the inputs that act.
+
+    fastest_square : x, u, c -> square [rad2/s2] of a rate that the body does not exceed while it turns by the
+                     scene's largest angle of a sub-step
+    step           : x, u, c, h -> x after one sub-step of h [s]; its second result is the estimated error,
+                     (2,), where the method is controlled by it or the scene shows it
+    error_exponent : power of h with which the estimated error grows
+    propagation    : the functions that the scene's co-simulation uses: of fastest_square and step as many as
+                     its method needs; by_torque: u, c -> angular acceleration by the torque alone, (3,)
+                     [rad/s2], for Taylor steps; free_...: exact free motion, see `propagators.exact`
+    """
+
+    fastest_square: ca.Function
+    step: ca.Function
+    error_exponent: int
+    propagation: tuple[ca.Function, ...]
+
+
+def step_functions(
+    scene: Scene, plan: Plan, dynamics: Dynamics, symbols: tuple[ca.SX, ca.SX, ca.SX], axes: AxesGraph
+) -> StepFunctions:
+    """Returns the steps of a scene.
+
+    symbols : x, u and c, of which `dynamics` is made
+    A scene that has exact free motion alone is given the step of dop853, which its co-simulation never takes.
+    """
+    x, h = symbols[0], ca.SX.sym("h")
+    shows_error = "error_estimate" in scene.outputs.names
+    motion = StepSymbols(
+        x,
+        dynamics.state_rate,
+        dynamics.law,
+        dynamics.numbers,
+        dynamics.torque,
+        h,
+        scene.rotation.tolerance,
+        shows_error,
+    )
+    method = plan.method or PROPAGATORS["dop853"]
+    assert method.build is not None
+    built = method.build(motion)
+    rate_square = _rate_function(scene.rotation.max_angle_step, motion, dynamics, symbols)
+    step = _step_function(built, symbols, h)
+    series = ca.Function(
+        "by_torque", [*symbols[1:]], [motion.acceleration_by_torque], ["u", "c"], ["acceleration"]
+    )
+    needed = {"angle": (rate_square, step), "error": (step,), "series": (series,)}
+    stepping = needed[plan.method.control] if plan.method else ()
+    return StepFunctions(rate_square, step, built.exponent, (*stepping, *_free_motion(plan, axes)))
+
+
+def _rate_function(
+    angle: float, motion: StepSymbols, dynamics: Dynamics, symbols: tuple[ca.SX, ca.SX, ca.SX]
+) -> ca.Function:
+    """Returns fastest_square.
+
+    angle : largest angle of a sub-step [rad]
+    """
+    omega, by_torque = motion.state[4:], motion.acceleration_by_torque
+    square = fastest_square(omega, by_torque, motion.law.growth, angle, dynamics.spin_square)
+    return ca.Function("fastest_square", [*symbols], [square], ["x", "u", "c"], ["rate_square"])
+
+
+def _step_function(built: Step, symbols: tuple[ca.SX, ca.SX, ca.SX], h: ca.SX) -> ca.Function:
+    """Returns the function of a step, with its estimated error where it has one."""
+    results = {"x_next": built.state} | ({} if built.error is None else {"error": built.error})
+    return ca.Function("step", [*symbols, h], [*results.values()], ["x", "u", "c", "h"], [*results])
+
+
+def _free_motion(plan: Plan, axes: AxesGraph) -> list[ca.Function]:
+    """Returns the functions of exact free motion that a plan uses."""
+    if plan.free == "never":
+        return []
+    functions = free_functions(axes.a.numel(), axes.slices["free"])
+    if plan.free in ("always", "while free"):
+        functions += free_functions_of_start(axes.a.numel(), axes.slices["free"])
+    return functions
+
+
+def map_of_products(dynamics: Dynamics) -> ca.SX:
+    """Returns the linear map, (3, n), of products of two rates to the acceleration without torque.
+
+    n is the number of the law's products. Where the axes are principal, so that the squares of rates have no
+    effect, n is 3: the columns of squares are left out.
+    """
+    products = dynamics.law.gyroscopic(dynamics.numbers)
+    count = products.size2()
+    diagonal = all(products[i, j].is_zero() for i in range(3) for j in range(count) if i != j)
+    return ca.densify(products[:, :3] if diagonal and count else products)
