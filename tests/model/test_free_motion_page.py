@@ -4,9 +4,11 @@ Nothing of the page is taken for granted: Jacobi's functions are mpmath's, integ
 and the whole step is compared with a Taylor integration of Euler's equations.
 """
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -665,3 +667,16 @@ def test_start_of_the_code_holds_the_page_s_constants() -> None:
         right += [m.length, m.mean, mp.mpf(m.sign)]
         for a, b in zip(found, right, strict=True):
             close(a, b, 0, mp.mpf(ROUNDING))
+
+
+def test_equations_are_numbered_in_order_and_the_code_cites_none_that_is_missing() -> None:
+    model = Path(free_motion.__file__).parents[3]
+    page = (model / "docs" / "free_motion.md").read_text(encoding="utf-8")
+    tags = [int(number) for number in re.findall(r"\\tag\{(\d+)\}", page)]
+    assert tags == list(range(1, len(tags) + 1))
+    for module in (free_motion, theta):
+        text = Path(module.__file__).read_text(encoding="utf-8")
+        cited = re.findall(r"\[FM\]\s+eqs?\.((?:(?:\s|,|to|and)*\(\d+\))+)", text)
+        numbers = {int(number) for group in cited for number in re.findall(r"\d+", group)}
+        assert len(numbers) > 5
+        assert numbers <= set(tags)
