@@ -103,6 +103,10 @@ class Vessel(Table):
 
     Either `pmi`, three mass-normalised moments [m2] along the vessel axes, or `inertia`, the full
     tensor [kg m2] at the mass given, which scales with the mass when that is an input.
+    The tensor is taken about the vessel's centre of mass, in vessel axes: its diagonal elements are the
+    integrals of y^2 + z^2, z^2 + x^2, x^2 + y^2 over mass, its off-diagonal elements MINUS the integrals of
+    x y, x z, y z. Where a data sheet states products of inertia as the integrals themselves, their signs are
+    to be reversed.
     """
 
     mass: Mass

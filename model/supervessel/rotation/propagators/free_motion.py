@@ -4,17 +4,20 @@ Axes are principal, moments J0 <= J1 <= J2. The body rates are Jacobi functions 
 from them and one integral of the third kind. No elliptic integral is evaluated: a series starts everything
 at a small share of the span, and addition theorems double it until the whole span is covered.
 
-The axes are named so that rate 2 never changes sign: where it would, axes 0 and 2 are exchanged, and where
-it is negative the body is turned by pi about axis 0. With l the length of the angular momentum, T the energy,
+The axes are named so that rate 2 never changes sign, [FM] eqs. (4), (5): where it would, axes 0 and 2 are
+exchanged, and where it is negative the body is turned by pi about axis 0. With l the length of the angular
+momentum and T the energy, [FM] eqs. (3), (6),
 
     G = 2 T J2 - l^2    H = l^2 - 2 T J0    E = l^2 - 2 T J1    P = J0 J1 J2
     A = H (J2 - J1)/P   B = G (J1 - J0)/P   A - B = E (J2 - J0)/P
 
-and S' = C D, C' = -A S D, D' = -B S C, S = 0 and C = D = 1 at first: S sqrt(A), C, D are Jacobi's sn, cn, dn.
-The turn is conj(p(0)) R p(t), where p takes the momentum's direction in the body to axis 2 the shortest way
-and R is a rotation about axis 2 by the angle psi, psi' = (2 T + l w2)/(l + L2). psi is that of the motion
-which starts at S = 0, c0 t + chi, and one arctangent more for where on its path the body starts.
-Source: Jacobi's and Weierstrass's functions and their addition theorems; derived from these.
+and S' = C D, C' = -A S D, D' = -B S C, S = 0 and C = D = 1 at first, [FM] eq. (7): S sqrt(A), C, D are
+Jacobi's sn, cn, dn. The turn is conj(p(0)) R p(t), [FM] eq. (19), where p takes the momentum's direction in
+the body to axis 2 the shortest way and R is a rotation about axis 2 by the angle psi,
+psi' = (2 T + l w2)/(l + L2), [FM] eq. (21). psi is the sum of the angle of the motion that starts at S = 0,
+which is c0 t + chi, [FM] eqs. (22), (23), and of one arctangent for where on its path the body starts.
+Source: [FM], the derivation equation by equation, from Jacobi's and Weierstrass's functions and their
+addition theorems.
 
 Derivatives are right wherever the moments are distinct, and by rates and time wherever. Their error is some
 roundings, times J2/J0 for a spin about axis 0. At a spin about axis 1 the smaller rates are to be 0 or above
@@ -37,13 +40,15 @@ A spin that is steady needs no doublings however long it lasts: they are no limi
 SERIES_TERMS = 8
 """Highest power of t^2 in the series of Weierstrass's function.
 
-Its nearest pole but the one at 0 is at a phase of pi or beyond: terms decrease by (FIRST_ANGLE/pi)^2 each.
+[FM] eq. (13). The nearest pole other than that at 0 is at a phase of pi or beyond: terms decrease by
+(FIRST_ANGLE/pi)^2 each.
 """
 
 INTEGRAL_TERMS = 9
-"""Terms of chi's series, which decrease by (FIRST_ANGLE 2/pi)^2 each: its nearest pole is at pi/2 or beyond.
+"""Terms of chi's series, [FM] eq. (24).
 
-chi is less than 3e-3 of c0 t there, so that 4e-14 of it suffice.
+Its nearest pole is at pi/2 or beyond, so that terms decrease by (FIRST_ANGLE 2/pi)^2 each. chi is some
+5e-3 of c0 t there at the most, so that 2e-14 of chi suffice.
 """
 
 FLOOR = 2.0**-500
@@ -55,7 +60,8 @@ Their squares, by which the rates are divided, must not underflow.
 NEGLIGIBLE = 2.0**-57
 """Bound [rad] of the last arctangent below which it is left out, close to a spin about axis 2.
 
-There its argument is that of 0. It is of the fourth order in the other rates: so is what is lost of it.
+There its argument is that of 0. The arctangent is of the fourth order in the other rates, [FM] eq. (39), and
+so is what leaving it out loses.
 """
 
 VARYING = 4
@@ -94,6 +100,8 @@ def start(moments: ca.SX, omega: ca.SX, time: ca.SX, share: ca.SX) -> ca.SX:
     """Returns the state of the recurrence at time * share, (13,): S, C, D, chi, then what stays.
 
     share : 2^-n, with n as `phase` demands
+    What stays is A, B, A - B, N, c, r, l, c0 and the sign of the exchange.
+    Source: [FM] eqs. (6), (22), (25) to (27), and the series of `_series`.
     """
     _, moving, span = _guarded(omega, time)
     E = separation(moments, moving)
@@ -115,7 +123,8 @@ def start(moments: ca.SX, omega: ca.SX, time: ca.SX, share: ca.SX) -> ca.SX:
     per_J2 = J0 * J1 * per_product
     rate = (L0 * w0 + L1 * w1 + L2 * w2 + length * peak * per_J2) * per_sum  # c0
 
-    # of the integral's pole, and of the momentum's direction on the path from S = 0: C + i r S
+    # of the integral's pole, and of the momentum's direction on the path from S = 0, C + i r S;
+    # [FM] eqs. (25) to (27)
     lean = width * (J1 * per_product)
     N = lower * H / (J0 * J0 * J1)
     c, r = length * lean * N, peak * lean
@@ -128,8 +137,8 @@ def start(moments: ca.SX, omega: ca.SX, time: ca.SX, share: ca.SX) -> ca.SX:
 def double(s: ca.SX) -> ca.SX:
     """Returns the state of the recurrence at twice the time.
 
-    S, C, D by duplication; chi by the addition theorem of the third kind, which adds one arctangent. No sum
-    here cancels but where the result is near a zero.
+    S, C, D by duplication, [FM] eqs. (15), (16); chi by the addition theorem of the third kind, which adds
+    one arctangent, [FM] eq. (37). No sum here cancels, except where the result is near a zero.
     """
     S, C, D, chi, A, B, A_less_B, N, c, r = ca.vertsplit(s)[:10]
     SS, CC, DD = S * S, C * C, D * D
@@ -151,6 +160,7 @@ def finish(moments: ca.SX, omega: ca.SX, time: ca.SX, s: ca.SX) -> tuple[ca.SX, 
     s : state of the recurrence at `time`
 
     The attitude at the end is attitude * turn. The turn's sign is continuous in time, (1, 0, 0, 0) at 0.
+    Source: [FM] eqs. (17), (18) for the rates, (38) for psi, (19), (20) for the turn.
     """
     rest, moving, span = _guarded(omega, time)
     S, C, D, chi, A, _, _, _, _, r, length, rate, sign = ca.vertsplit(s)
@@ -162,14 +172,14 @@ def finish(moments: ca.SX, omega: ca.SX, time: ca.SX, s: ca.SX) -> tuple[ca.SX, 
     per_product = 1.0 / (J0 * J1 * J2)
     per_J0, per_J1, per_J2 = J1 * J2 * per_product, J0 * J2 * per_product, J0 * J1 * per_product
 
-    # rates: addition theorems with the rates and their derivatives now
+    # rates: addition theorems with the rates and their derivatives now, [FM] eqs. (17), (18)
     e0, e1, e2 = -upper * per_J0 * (w1 * w2), width * per_J1 * (w2 * w0), -lower * per_J2 * (w0 * w1)
     per_d = 1.0 / (C * C + S * S * (w2 * w2) * (width * upper * (J2 * per_product)))
     v0 = (w0 * C + e0 * (S * D)) * per_d
     v1 = (w1 * (C * D) + e1 * S) * per_d
     v2 = (w2 * D + e2 * (S * C)) * per_d
 
-    # psi
+    # psi, [FM] eq. (38)
     x0, y0, x1, y1 = J0 * w0, J1 * w1, J0 * v0, J1 * v1
     f = lower * (J1 * per_J0)
     Sw = S * w1
@@ -233,7 +243,10 @@ def _guarded(omega: ca.SX, time: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
 
 
 def named(moments: ca.SX, omega: ca.SX, exchanged: ca.SX) -> tuple[Triple, Triple, ca.SX]:
-    """Returns moments and rates by the names of the axes used here, and -1 where the body is turned by pi."""
+    """Returns moments and rates by the names of the axes used here, and -1 where the body is turned by pi.
+
+    Source: [FM] eqs. (4), (5).
+    """
     J0, J1, J2 = ca.vertsplit(moments)
     w0, w1, w2 = ca.vertsplit(omega)
     first, third = ca.if_else(exchanged, w2, w0), ca.if_else(exchanged, w0, w2)
@@ -244,7 +257,7 @@ def named(moments: ca.SX, omega: ca.SX, exchanged: ca.SX) -> tuple[Triple, Tripl
 
 
 def invariants(J: Triple, w: Triple) -> Pair:
-    """Returns G and H."""
+    """Returns G and H, [FM] eq. (3), without cancellation."""
     a, b, c = (J[i] * (w[i] * w[i]) for i in range(3))
     return (J[2] - J[0]) * a + (J[2] - J[1]) * b, (J[1] - J[0]) * b + (J[2] - J[0]) * c
 
@@ -252,8 +265,8 @@ def invariants(J: Triple, w: Triple) -> Pair:
 def separation(moments: ca.SX, omega: ca.SX) -> ca.SX:
     """Returns E = J2 (J2 - J1) w2^2 - J0 (J1 - J0) w0^2, good to rounding where the two terms cancel.
 
-    Near the separatrix the period goes with log E. Each term is made as an unevaluated sum of two doubles,
-    by Dekker's formulas for what rounding takes from a difference and from a product.
+    [FM] eq. (3). Near the separatrix the period goes with log E. Each term is made as an unevaluated sum of
+    two doubles, by Dekker's formulas for what rounding takes from a difference and from a product.
     """
     J0, J1, J2 = ca.vertsplit(moments)
     a, a_rest = _term(J2, J2 - J1, (J2 - (J2 - J1)) - J1, omega[2])
@@ -281,6 +294,7 @@ def _series(A: ca.SX, B: ca.SX, kappa: ca.SX, t: ca.SX) -> tuple[ca.SX, ca.SX, c
     """Returns S, C, D at a small t, and the integral of v/(1 - kappa B v) up to there, v = (1 - D)/B.
 
     1/v = 2 (W + h) where W is Weierstrass's function, so that v t^-2 is a quotient of 1 and a short series.
+    Source: [FM] eqs. (10) to (14), (24).
     """
     square = t * t
     x, y = A * square, B * square

@@ -1,13 +1,13 @@
 """Free rotation of a rigid body from one start to many times, by theta functions.
 
 Names of axes and symbols are those of `free_motion`. Jacobi's functions of u are quotients of theta
-functions of v = pi u/(2 K). l + L2 has the period 4 i K', and where it is 0, exp(i psi) has a simple
-zero or pole: it is exp(i W t) z/conj(z) with z = theta_4(v + i b) of the square of the nome, and half of
-psi needs no arctangent. A time costs two pairs of sine and cosine and short polynomials of cos(2 v): all
-series fall as the nome to the power of n^2. What depends on the start alone is found once, by
-arithmetic-geometric means and square roots.
-Source: [VS], who sum the integral of the third kind as such an argument; Jacobi's theta functions and
-Landen's transformation; derived from these.
+functions of v = pi u/(2 K), [FM] eqs. (40), (41). l + L2 has the period 4 i K', and where it is 0,
+exp(i psi) has a simple zero or pole: it is exp(i W t) z/conj(z) with z = theta_4(v + i b) of the square
+of the nome, [FM] eqs. (42), (43), and half of psi needs no arctangent. A time costs two pairs of sine and
+cosine and short polynomials of cos(2 v): all series fall as the nome to the power of n^2. What depends on
+the start alone is found once, by arithmetic-geometric means and square roots.
+Source: [FM] section 9, the derivation, from Jacobi's theta functions and Landen's transformation; [VS] sum
+the integral of the third kind as such an argument.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from supervessel.rotation.attitude import product, unit
 from supervessel.rotation.propagators.free_motion import Pair, complex_product, invariants, named, separation
 
 LARGEST_NOME = 0.25
-"""Above it `constants` are NaN; what the series leave out there is below 2^-53/8.
+"""Above it `constants` are NaN; what the series leave out there is below 2^-53/8, [FM] eq. (45).
 
 The nome is larger for m = B/A above 0.987, near the separatrix alone.
 """
@@ -36,7 +36,7 @@ TINY = 2.0**-1000
 
 @dataclass(frozen=True)
 class _Series:
-    """Theta functions of real v as polynomials of e = cos(2 v), the nome's powers in them.
+    """Theta functions of real v as polynomials of e = cos(2 v), the nome's powers in them, [FM] eq. (45).
 
     even, odd : theta_3, at e; theta_4 at -e
     slow_even, slow_odd : theta_2/(2 nome^(1/4) cos v), at e; theta_1/(... sin v) at -e
@@ -130,7 +130,10 @@ def constants(state: ca.SX, moments: ca.SX, to_body: ca.SX, scale: ca.SX) -> ca.
 
 
 def at(k: ca.SX, time: ca.SX) -> ca.SX:
-    """Returns attitude and angular velocity, (7,), a time [s] after the start that k, (CONSTANTS,), is of."""
+    """Returns attitude and angular velocity, (7,), a time [s] after the start that k, (CONSTANTS,), is of.
+
+    Source: [FM] eqs. (41), (42), (50).
+    """
     frequency, half, *phase = ca.vertsplit(k[:4])
     series, turning, momenta = _Series.read(k[4:15]), tuple(ca.vertsplit(k[15:22])), ca.vertsplit(k[22:25])
     to_attitude, attitude, begun = ca.reshape(k[25:41], 4, 4), k[41:45], k[45:49]
@@ -143,7 +146,7 @@ def at(k: ca.SX, time: ca.SX) -> ca.SX:
 
 
 def _motion(moments: ca.SX, omega: ca.SX) -> _Motion:
-    """Returns the constants of a motion, principal axes."""
+    """Returns the constants of a motion, principal axes, [FM] eqs. (40) to (44)."""
     E = separation(moments, omega)
     exchanged = E < 0.0
     J, w, flip = named(moments, omega, exchanged)
@@ -200,7 +203,7 @@ def _means(A: ca.SX, B: ca.SX, A_less_B: ca.SX, start: Pair, rise: ca.SX) -> tup
 
     Landen's transformation takes an amplitude f to twice its size, but for an angle d that falls as the
     nome: v = f - d_0/2 - d_1/4 - ..., nested square roots of unit complex numbers. It takes i b the same
-    way, or, if that is nearer to i K' than to 0, the distance from there.
+    way, or, if that is nearer to i K' than to 0, the distance from there. Source: [FM] eqs. (46) to (48).
     """
     a, b = ca.sqrt(A), ca.sqrt(A_less_B)
     difference, m = B / (a + b), B / A
@@ -250,13 +253,16 @@ def _nome_square(a: ca.SX, b: ca.SX, difference: ca.SX) -> ca.SX:
 
 
 def _nome(share: ca.SX) -> ca.SX:
-    """Returns a nome from (1 - sqrt(k'))/(1 + sqrt(k'))/2, to rounding where it is below LARGEST_NOME^2."""
+    """Returns a nome from (1 - sqrt(k'))/(1 + sqrt(k'))/2, to rounding where it is below LARGEST_NOME^2.
+
+    Source: [FM] eq. (49).
+    """
     x = _square(_square(share))
     return share * (1.0 + x * (2.0 + x * (15.0 + x * (150.0 + x * 1707.0))))
 
 
 def _turning(nome: ca.SX, sides: Pair, sign: ca.SX) -> tuple[ca.SX, ...]:
-    """Returns what `_turn` needs: the series of theta_4(v + i b), of the square of the nome.
+    """Returns what `_turn` needs: the series of theta_4(v + i b), of the square of the nome, [FM] eq. (45).
 
     sides : nome^2 exp(2 b), nome^2 exp(-2 b)
     """
