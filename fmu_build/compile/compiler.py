@@ -6,6 +6,7 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from importlib.machinery import PathFinder
+from importlib.metadata import version
 from pathlib import Path
 
 from fmu_build.compile.universal import universal_library
@@ -107,7 +108,7 @@ def _thin_libraries(  # noqa: PLR0913, PLR0917
 def _place_of_library(content: bytes, platform: Platform, name: str, flags: Sequence[str]) -> Path:
     """Returns where a library is kept: under all that it depends on."""
     return place_of_library(
-        repr([content, platform.target, name, *flags, str(compiler()), compiler().stat().st_size]).encode()
+        repr([content, platform.target, name, *flags, version("ziglang"), compiler().stat().st_size]).encode()
     )
 
 

@@ -174,7 +174,7 @@ def state_variables(scene: Scene) -> tuple[Variable, ...]:
     That is the angular velocity, or the angular momentum where every change keeps it; (x, y, z) in body axes.
     """
     kept, words = "angular_velocity", OUTPUTS["angular_velocity"].description
-    nominal = _rate(scene)
+    nominal = _usable(_rate(scene))
     if keeps_momentum(scene):
         kept, words = "angular_momentum", "angular momentum about the barycentre, body axes"
         nominal = _usable(OUTPUTS[kept].nominal(_magnitudes(scene)))
