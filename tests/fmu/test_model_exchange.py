@@ -245,7 +245,7 @@ def test_nominals_are_those_of_the_model_description(fmi):
     instance.fmu.getNominalsOfContinuousStates(found, 7)
     variables = {v.name: v for v in instance.description.modelVariables}
     assert list(found) == [float(variables[name].nominal or 1.0) for name in STATES]
-    assert found[4] == pytest.approx(np.linalg.norm(RATES))
+    assert found[4] == pytest.approx(np.linalg.norm(RATES), rel=5e-3)  # three digits
     instance.free()
 
 
