@@ -62,7 +62,7 @@ accuracy: .venv/installed-dev
 	$(BIN)/python -m pytest -m accuracy tests/accuracy
 
 surroundings: .venv/installed-dev
-	$(BIN)/python -m pytest -n auto -m surroundings tests/surroundings
+	$(BIN)/python -m pytest -n auto -m surroundings tests
 
 bench: .venv/installed-dev
 	$(BIN)/python tests/bench/run.py

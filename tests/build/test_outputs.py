@@ -58,7 +58,7 @@ COMMANDS = {
 }
 
 
-@pytest.fixture(params=COMMANDS)
+@pytest.fixture(params=["build", "import", pytest.param("trade", marks=pytest.mark.surroundings)])
 def command(request):
     return COMMANDS[request.param]
 
