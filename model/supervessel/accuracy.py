@@ -1,4 +1,4 @@
-"""The choice of law and propagator by `[accuracy]`, at the place where it was: now of `fmu` and `problems`."""
+"""The choice of law and propagator by `[accuracy]`, importable from where it used to be."""
 
 from supervessel.fmu import choose
 from supervessel.problems import AccuracyError
