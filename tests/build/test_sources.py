@@ -28,6 +28,7 @@ STANDARD_HEADERS = {path.name for path in fmi_headers().glob("fmi*.h")}
 LIBRARY_HEADERS = {
     "fenv.h",
     "float.h",
+    "locale.h",
     "math.h",
     "stdarg.h",
     "stdbool.h",
