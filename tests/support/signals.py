@@ -39,6 +39,18 @@ duration = 10.0
 step = 1.0
 """
 
+IMPORT = (
+    "supervessel",
+    "import",
+    "side.scn",
+    "--config",
+    "Config",
+    "--table",
+    "code.toml",
+    "-o",
+    "side.toml",
+)
+
 ACCURACY = """\
 [inputs]
 torque = true
@@ -101,17 +113,7 @@ CASES = {
         ("interrupted", KEPT),
     ),
     "import": Case(
-        (
-            "supervessel",
-            "import",
-            "side.scn",
-            "--config",
-            "Config",
-            "--table",
-            "code.toml",
-            "-o",
-            "side.toml",
-        ),
+        IMPORT,
         (),
         ("side.toml",),
     ),

@@ -15,7 +15,7 @@ import pytest
 from fmu_build.storage.cache import cache_folder
 from orbiter.files import Files
 from support.processes import COMPILERS, ROOT, kept_in
-from support.signals import ACCURACY, BALL, EXPERIMENT
+from support.signals import ACCURACY, BALL, EXPERIMENT, IMPORT
 
 WATCHDOG = 300.0
 """Seconds after which a command counts as one that never ends."""
@@ -23,17 +23,6 @@ WATCHDOG = 300.0
 BUILD = ("fmu_build", "ball.toml")
 CHOICE = ("fmu_build", "choice.toml", "-o", "choice.fmu")
 TRADE = ("supervessel", "trade", "trade.toml", "--quick", "-o", "out")
-IMPORT = (
-    "supervessel",
-    "import",
-    "side.scn",
-    "--config",
-    "Config",
-    "--table",
-    "code.toml",
-    "-o",
-    "side.toml",
-)
 CACHE = ("supervessel", "cache")
 
 COMMANDS = {"build": BUILD, "choice": CHOICE, "trade": TRADE, "import": IMPORT, "cache": CACHE}
@@ -104,6 +93,12 @@ def place_in(folder: Path, *, linked: bool = True) -> Place:
     if linked:
         link_compiled(place.cache)
     return place
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Place:
+    """Folders of a command, with what has been compiled before."""
+    return place_in(tmp_path)
 
 
 def link_compiled(cache: Path) -> None:

@@ -25,20 +25,15 @@ from support.surroundings import (
     assert_right,
     needs_linux,
     needs_root,
-    place_in,
+    place,
     right_or_refused,
     run,
     strangers,
 )
 
-__all__ = ["strangers"]
+__all__ = ["place", "strangers"]
 
 pytestmark = [pytest.mark.surroundings, needs_linux]
-
-
-@pytest.fixture
-def place(tmp_path):
-    return place_in(tmp_path)
 
 
 # Environment.

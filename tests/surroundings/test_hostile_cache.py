@@ -27,21 +27,17 @@ from support.surroundings import (
     link_compiled,
     needs_linux,
     needs_root,
+    place,
     place_in,
     run,
     strangers,
 )
 
-__all__ = ["strangers"]
+__all__ = ["place", "strangers"]
 
 pytestmark = [pytest.mark.surroundings, needs_linux]
 
 UNUSED = "the cache is left unused, nothing is kept: "
-
-
-@pytest.fixture
-def place(tmp_path):
-    return place_in(tmp_path)
 
 
 # Whose it is.
