@@ -2,8 +2,9 @@
 
 import os
 import tempfile
+from pathlib import Path
 
-from fmu_build.storage.cache import cache_folder
+from fmu_build.storage.compiler_files import compiler_folder
 
 
 def pytest_configure(config):
@@ -15,4 +16,5 @@ def pytest_configure(config):
         folder = tempfile.TemporaryDirectory(prefix="supervessel-test-", ignore_cleanup_errors=True)
         os.environ["SUPERVESSEL_TESTS"] = folder.name
         config.add_cleanup(folder.cleanup)
-        os.environ |= dict.fromkeys(("ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR"), str(cache_folder()))
+        os.environ["ZIG_GLOBAL_CACHE_DIR"] = str(compiler_folder())
+        os.environ["ZIG_LOCAL_CACHE_DIR"] = str(Path(folder.name, "zig"))

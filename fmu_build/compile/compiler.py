@@ -4,7 +4,8 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from hashlib import sha256
 from importlib.machinery import PathFinder
 from importlib.metadata import version
 from pathlib import Path
@@ -16,11 +17,12 @@ from fmu_build.storage.cache import (
     cache_folder,
     count_compilation,
     in_use,
-    keep_library,
+    keep_bytes,
     place_of_library,
-    read_library,
+    read_bytes,
     reason,
 )
+from fmu_build.storage.compiler_files import compiler_folder, is_changed, record, renewed
 from supervessel.problems import printable
 from supervessel.shell.processes import Workers, run
 
@@ -46,25 +48,23 @@ def fmi_headers() -> Path:
 
 
 def compile_binaries(  # noqa: PLR0913, PLR0917
-    sources: Sequence[str],
-    folder: Path,
+    files: Mapping[str, bytes],
+    main: str,
     platforms: Sequence[Platform],
     fmi: int,
     model_identifier: str,
     flags: Sequence[str] = FLAGS,
-    content: bytes = b"",
 ) -> dict[str, bytes]:
     """Compiles an FMU's library for each platform and returns the libraries by archive path, binaries/...
 
-    sources : C files, relative to `folder`, their headers beside them
-    folder  : where they lie
-    content : stands for all that is in the folder: what has been made of the same content is kept and not
-              compiled again; empty: nothing is kept
-    Raises BuildError with the compiler's own words for each platform where it fails.
+    files : all that the compiler may read of ours, by relative path
+    main  : the one that is compiled
+    What has been made of the same files is kept, and not compiled again. Raises BuildError with the
+    compiler's own words for each platform where it fails, or if what it reads and makes cannot be written.
     """
     contents = library_contents(platforms, fmi)
     needed = [platform for platform in PLATFORMS if any(platform in parts for parts in contents.values())]
-    thin = _thin_libraries(sources, folder, needed, model_identifier, flags, content)
+    thin = _thin_libraries(files, main, needed, model_identifier, flags)
     libraries = {}
     for name, parts in contents.items():
         path = f"binaries/{name}/{model_identifier}{parts[0].suffix}"
@@ -73,24 +73,23 @@ def compile_binaries(  # noqa: PLR0913, PLR0917
     return libraries
 
 
-def _thin_libraries(  # noqa: PLR0913, PLR0917
-    sources: Sequence[str],
-    folder: Path,
+def _thin_libraries(
+    files: Mapping[str, bytes],
+    main: str,
     platforms: Sequence[Platform],
     model_identifier: str,
     flags: Sequence[str],
-    content: bytes,
 ) -> dict[Platform, bytes]:
     """Returns the library of each platform; those that fail are all named in one BuildError."""
+    content = digest_of(files)
 
     def compiled(platform: Platform) -> bytes:
         name = f"{model_identifier}{platform.suffix}"
-        place = _place_of_library(content, platform, name, flags) if content else None
-        library = read_library(place) if place else None
+        place = _place_of_library([content, main, platform.target, name, *flags])
+        library = read_bytes(place)
         if library is None:
-            library = _compiled([Path(source) for source in sources], platform, name, flags, folder)
-            if place:
-                keep_library(place, library)
+            library = _compiled([Path(main)], platform, name, flags, files)
+            keep_bytes(place, library)
         return library
 
     libraries, problems = {}, []
@@ -105,11 +104,22 @@ def _thin_libraries(  # noqa: PLR0913, PLR0917
     return libraries
 
 
-def _place_of_library(content: bytes, platform: Platform, name: str, flags: Sequence[str]) -> Path:
-    """Returns where a library is kept: under all that it depends on."""
-    return place_of_library(
-        repr([content, platform.target, name, *flags, version("ziglang"), compiler().stat().st_size]).encode()
-    )
+def digest_of(files: Mapping[str, bytes]) -> str:
+    """Returns what stands for files, by path, and their contents."""
+    digest = sha256()
+    for path, text in sorted(files.items()):
+        digest.update(f"{path} {len(text)} ".encode() + text)
+    return digest.hexdigest()
+
+
+def _place_of_library(question: Sequence[str]) -> Path:
+    """Returns where a library is kept that answers a question, and comes of this compiler."""
+    said = repr([*question, version("ziglang"), compiler().stat().st_size])
+    try:
+        return place_of_library(said.encode())
+    except OSError as error:
+        place = error.filename or cache_folder()
+        raise BuildError(f"{printable(str(place))}: {reason(error, 'to compile in')}") from None
 
 
 def compile_library(
@@ -127,7 +137,7 @@ def compile_library(
     where the library cannot be written.
     """
     whole = [Path(folder or Path.cwd(), source) for source in sources]
-    library = _compiled(whole, platform, output.name, flags, folder)
+    library = _compiled(whole, platform, output.name, flags)
     try:
         output.write_bytes(library)
     except OSError as error:
@@ -135,10 +145,17 @@ def compile_library(
 
 
 def _compiled(
-    sources: Sequence[Path], platform: Platform, name: str, flags: Sequence[str], folder: Path | None
+    sources: Sequence[Path],
+    platform: Platform,
+    name: str,
+    flags: Sequence[str],
+    files: Mapping[str, bytes] | None = None,
 ) -> bytes:
-    """Returns the library of that file name. It is made in the cache, whose path the linker can work with."""
-    cache = cache_folder()
+    """Returns the library of that file name. It is made in the cache, whose path the linker can work with.
+
+    files : by relative path, are there for the compiler, which reads relative sources among them
+    A compiler that fails where its own files have changed is started again, with new ones.
+    """
     for source in sources:
         if set("\n\r") & set(str(source)):
             raise BuildError(
@@ -147,31 +164,53 @@ def _compiled(
     command = [str(compiler()), "cc", "-target", platform.target, *flags]
     if platform.suffix == ".dylib":
         command.append(f"-Wl,-install_name,@rpath/{name}")
+    command += ["-isystem", str(fmi_headers()), "-o", name, *map(str, sources)]
+    if platform.suffix == ".so":
+        command.append("-lm")
+    cache = cache_folder()
     try:
-        with in_use(cache), tempfile.TemporaryDirectory(dir=cache, prefix="made-") as made:
-            output = Path(made, name)
-            command += ["-isystem", str(fmi_headers()), "-o", str(output), *map(str, sources)]
-            if platform.suffix == ".so":
-                command.append("-lm")
-            problem = _run(command, folder, cache, Path(made, "objects"))
-            count_compilation(cache)
-            if problem is not None:
-                raise BuildError(f"compiler for {platform.name} {problem}")
-            return output.read_bytes()
+        kept = compiler_folder()
+        made, problem = _made(command, name, kept, files or {})
+        if made is None and is_changed(kept):
+            made, problem = _made(command, name, renewed(kept), files or {})
     except OSError as error:
         place = error.filename or cache
         raise BuildError(f"{printable(str(place))}: {reason(error, 'to compile in')}") from None
+    if made is None:
+        raise BuildError(f"compiler for {platform.name} {problem}")
+    return made
 
 
-def _run(command: Sequence[str], folder: Path | None, cache: Path, objects: Path) -> str | None:
-    """Runs the compiler and returns what it did instead of compiling, if so.
+def _made(
+    command: Sequence[str], name: str, kept: Path, files: Mapping[str, bytes]
+) -> tuple[bytes | None, str]:
+    """Returns the file of that name that a compiler has made, or None and what it did instead.
 
-    objects : folder for what is compiled from our sources: always made anew, since the compiler believes
-              whatever it finds there
+    kept  : folder of the compiler's own files
+    files : by relative path, beside which it works
     """
-    kept_in = f"The compiler's cache is {printable(str(cache))}; `supervessel cache --clear` removes it"
+    generation = kept.parent
+    with in_use(generation), tempfile.TemporaryDirectory(dir=generation, prefix="made-") as folder:
+        for path, content in files.items():
+            file = Path(folder, path)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(content)
+        problem = _run(command, Path(folder), kept)
+        count_compilation(generation)
+        made = Path(folder, name).read_bytes() if problem is None else None
+    if made is not None:
+        record(kept)
+    return made, problem or ""
+
+
+def _run(command: Sequence[str], folder: Path, kept: Path) -> str | None:
+    """Runs the compiler in a folder and returns what it did instead of compiling, if so.
+
+    What it makes of our sources is always made anew, in that folder, since it believes whatever it finds.
+    """
+    kept_in = f"The compiler's cache is {printable(str(kept))}; `supervessel cache --clear` removes it"
     try:
-        done = run(command, TIME_LIMIT, folder, environment(cache, objects))
+        done = run(command, TIME_LIMIT, folder, environment(kept, folder / "objects"))
     except subprocess.TimeoutExpired:
         return f"did not end within {TIME_LIMIT:g} s.\n{kept_in}"
     if done.returncode == 0:
@@ -179,10 +218,10 @@ def _run(command: Sequence[str], folder: Path | None, cache: Path, objects: Path
     return f"failed:\n{(done.stderr or done.stdout).strip()}\n{kept_in}"
 
 
-def environment(cache: Path, objects: Path) -> dict[str, str]:
+def environment(kept: Path, objects: Path) -> dict[str, str]:
     """Returns all the variables that a compiler gets: its result depends on no other."""
-    kept = {"ZIG_GLOBAL_CACHE_DIR": str(cache), "ZIG_LOCAL_CACHE_DIR": str(objects)}
-    return kept | {name: os.environ[name] for name in NEEDED if name in os.environ}
+    folders = {"ZIG_GLOBAL_CACHE_DIR": str(kept), "ZIG_LOCAL_CACHE_DIR": str(objects)}
+    return folders | {name: os.environ[name] for name in NEEDED if name in os.environ}
 
 
 def compiler() -> Path:

@@ -3,10 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from fmu_build.compile.compiler import FLAGS, compile_binaries
-from fmu_build.errors import BuildError
 from fmu_build.platforms import Platform
-from fmu_build.storage.cache import cache_folder, kept_sources, reason
-from supervessel.problems import printable
 
 WHOLE = "whole.c"
 """All of an FMU's C in one translation unit, so that the compiler inlines across files."""
@@ -29,9 +26,5 @@ def compile_sources(  # noqa: PLR0913, PLR0917
     Raises BuildError if the compiler fails, or if what it reads and makes cannot be written.
     """
     whole = "".join(f'#include "sources/{name}"\n' for name in names)
-    try:
-        folder = kept_sources({**packed, WHOLE: whole.encode()})
-    except OSError as error:
-        place = error.filename or cache_folder()
-        raise BuildError(f"{printable(str(place))}: {reason(error, 'to compile in')}") from None
-    return compile_binaries([WHOLE], folder, platforms, fmi, identifier, flags, folder.name.encode())
+    files = {**packed, WHOLE: whole.encode()}
+    return compile_binaries(files, WHOLE, platforms, fmi, identifier, flags)

@@ -1,13 +1,12 @@
 """CasADi functions as C: generated, compiled and loaded back; and the FMU's own C as a CasADi function."""
 
-import hashlib
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import casadi as ca
 
-from fmu_build.compile.compiler import FLAGS, compile_library
+from fmu_build.compile.compiler import FLAGS, compile_library, digest_of
 from fmu_build.errors import BuildError
 from fmu_build.generate.equations_source import generated_c
 from fmu_build.generate.model import generate as scene_sources
@@ -84,10 +83,7 @@ def _compiled(
     """
     folder.mkdir(parents=True, exist_ok=True)
     platform = host_platform()
-    digest = hashlib.sha256()
-    for path, text in sorted(files.items()):
-        digest.update(f"{path} {len(text)} ".encode() + text)
-    library = folder / f"{name}_{digest.hexdigest()[:16]}{platform.suffix}"
+    library = folder / f"{name}_{digest_of(files)[:16]}{platform.suffix}"
     if platform.suffix == ".so":  # elsewhere the linker asks by itself that every function is there
         flags = (*flags, "-Wl,-z,defs")
     if not library.exists():

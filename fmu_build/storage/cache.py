@@ -1,4 +1,4 @@
-"""What is kept from one run to the next: what compilers have made, sources that they compile, results.
+"""What is kept from one run to the next: what compilers have made, results, choices.
 
 All of it is in supervessel-N (N: version of this layout) below the user's cache folder, or below the folder
 that SUPERVESSEL_CACHE names. In it are generations: the newest is in use, and when it has grown large
@@ -19,7 +19,7 @@ import stat
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
@@ -35,7 +35,7 @@ from fmu_build.storage.temporary import (
 from supervessel.problems import printable
 from supervessel.shell.console import print_problem
 
-LAYOUT = 1
+LAYOUT = 2
 """Version of what is where; counted up whenever that changes."""
 
 OURS = f"supervessel-{LAYOUT}"
@@ -291,6 +291,11 @@ def generation_numbers(ours: Path) -> list[int]:
     return [int(match[1]) for match in found if match]
 
 
+def retire(generation: Path) -> None:
+    """Has a generation be followed by another."""
+    _touch(generation / FULL)
+
+
 def _touch(file: Path, more: bytes = b"") -> int:
     """Has a file say that it has just been used, adds to it, and returns its size; 0 where that fails."""
     flags = (
@@ -324,7 +329,7 @@ def count_compilation(generation: Path) -> None:
     """Has a generation know that something was compiled; now and then it is measured, and full when large."""
     count = _touch(generation / USED, b".")
     if count and count % MEASURED_EVERY == 0 and size_of(generation) > LARGEST:
-        _touch(generation / FULL)
+        retire(generation)
 
 
 def size_of(folder: Path) -> int:
@@ -347,38 +352,7 @@ def remove(path: Path) -> None:
             path.unlink()
 
 
-def kept_sources(files: Mapping[str, bytes]) -> Path:
-    """Returns a folder in the cache with exactly these files, by path, and nothing else.
-
-    The same files are in the same folder again: only then does the compiler know what it has built. What is
-    found there is compared byte by byte, and made anew where it differs.
-    """
-    digest = sha256()
-    for path, text in sorted(files.items()):
-        digest.update(f"{path} {len(text)} ".encode() + text)
-    kept = _folder_for("sources")
-    folder = kept / digest.hexdigest()
-    for _ in range(2):  # another run may put its own there in between
-        if _holds(folder, files):
-            return folder
-        remove(folder)
-        with tempfile.TemporaryDirectory(dir=kept) as name:
-            part = Path(name, "whole")
-            for path, text in files.items():
-                file = part / path
-                file.parent.mkdir(parents=True, exist_ok=True)
-                file.write_bytes(text)
-            try:
-                part.replace(folder)
-            except OSError:
-                if not os.path.lexists(folder):  # else another run was faster
-                    raise
-    if _holds(folder, files):
-        return folder
-    raise OSError(errno.EIO, "files change while they are used", str(folder))
-
-
-def _folder_for(kind: str) -> Path:
+def folder_for(kind: str) -> Path:
     """Returns a folder in the generation in use, for things of a kind; what is in its place is removed."""
     folder = cache_folder() / kind
     if not is_own_folder(folder):
@@ -387,46 +361,25 @@ def _folder_for(kind: str) -> Path:
     return folder
 
 
-def _holds(folder: Path, files: Mapping[str, bytes]) -> bool:
-    """Whether a folder holds these files, by path, as they are, and nothing else."""
-    if not is_own_folder(folder):
-        return False
-    folders = {str(parent) for path in files for parent in Path(path).parents} - {"."}
-    expected = folders | {str(Path(path)) for path in files}
-    found = set()
-    for name in _names(folder):
-        if name not in expected:
-            return False
-        found.add(name)
-    return found == expected and all(read_file(folder / path) == text for path, text in files.items())
-
-
-def _names(folder: Path) -> Iterator[str]:
-    """Yields the relative paths of all that is in a folder; what links lead to is not in it."""
-    for place, folders, names in os.walk(folder):
-        for name in (*folders, *names):
-            yield str(Path(place, name).relative_to(folder))
-
-
 def place_of_result(kind: str, question: bytes) -> Path:
     """Returns the file in which the answer to a question is kept.
 
     kind     : folder in the cache
     question : all that the answer depends on
     """
-    return _folder_for(kind) / f"{sha256(question).hexdigest()}.json"
+    return folder_for(kind) / f"{sha256(question).hexdigest()}.json"
 
 
 def place_of_library(question: bytes) -> Path:
     """Returns the file in which the library is kept that answers a question."""
-    return _folder_for("libraries") / sha256(question).hexdigest()
+    return folder_for("libraries") / sha256(question).hexdigest()
 
 
-def keep_library(place: Path, library: bytes) -> None:
-    """Keeps a library behind its digest; where that cannot be written nothing is kept."""
+def keep_bytes(place: Path, content: bytes) -> None:
+    """Keeps bytes behind a digest of them and of their place's name; nothing where they cannot be written."""
     with suppress(OSError), tempfile.NamedTemporaryFile(dir=place.parent, delete=False) as part:
         try:
-            part.write(sha256(library).digest() + library)
+            part.write(_digest(place, content) + content)
             part.close()
             remove(place)
             Path(part.name).replace(place)
@@ -435,11 +388,15 @@ def keep_library(place: Path, library: bytes) -> None:
             raise
 
 
-def read_library(place: Path) -> bytes | None:
-    """Returns the library that is kept in a place, None where there is none, or one that has been changed."""
+def read_bytes(place: Path) -> bytes | None:
+    """Returns what is kept in a place, None where there is nothing, or something that has been changed."""
     whole = read_file(place) or b""
-    library = whole[32:]
-    return library if library and sha256(library).digest() == whole[:32] else None
+    digest, content = whole[:32], whole[32:]
+    return content if content and digest == _digest(place, content) else None
+
+
+def _digest(place: Path, content: bytes) -> bytes:
+    return sha256(place.name.encode() + b"\0" + content).digest()
 
 
 def read_file(file: Path) -> bytes | None:

@@ -19,8 +19,9 @@ from fmu_build.generate.model import generate
 from fmu_build.generate.sources import source_file_names, source_files
 from fmu_build.platforms import host_platform
 from fmu_build.storage import cache as caches
-from fmu_build.storage import temporary
-from fmu_build.storage.cache import FULL, LARGEST, OURS, TAG, TAG_TEXT, USED, cache_folder, kept_sources
+from fmu_build.storage import compiler_files, temporary
+from fmu_build.storage.cache import FULL, LARGEST, OURS, TAG, TAG_TEXT, USED, cache_folder, folder_for
+from fmu_build.storage.compiler_files import FOLDER, RECORD
 from fmu_build.storage.temporary import temporary_folder
 from supervessel.__main__ import main
 from support import body, scene
@@ -81,9 +82,9 @@ def test_a_folder_that_is_named_keeps_all_that_the_user_has_in_it(base):
             old(base / kind / name)
         old(base / kind)
     before = everything(base)
-    kept_sources({"a.c": b"int a;\n"})
+    folder_for("libraries")
     (cache_folder() / FULL).touch()
-    kept_sources({"a.c": b"int a;\n"})
+    folder_for("libraries")
     main(["cache", "--clear"])
     assert everything(base) == before
     assert sorted(path.name for path in base.iterdir() if path.name not in before) == []
@@ -174,58 +175,6 @@ def test_a_user_whose_home_is_no_path_has_no_cache_in_the_working_folder(tmp_pat
 
 # What is in it, is looked at.
 
-FILES = {"whole.c": b'#include "sources/a.c"\n', "sources/a.c": b"int a;\n"}
-
-
-def plant(path):
-    path.write_text("__attribute__((constructor)) static void planted(void) {}\n")
-
-
-def fill(path):
-    path.unlink()
-    path.mkdir()
-    plant(path / "a.c")
-
-
-DAMAGES = {
-    "a constructor in a file": lambda kept: plant(kept / "sources" / "a.c"),
-    "another file": lambda kept: plant(kept / "sources" / "math.h"),
-    "another folder": lambda kept: (kept / "sources" / "sys").mkdir(),
-    "a file less": lambda kept: (kept / "whole.c").unlink(),
-    "a folder for a file": lambda kept: fill(kept / "sources" / "a.c"),
-    "a file for the folder": lambda kept: (shutil.rmtree(kept), plant(kept)),
-    "a file for all folders": lambda kept: (shutil.rmtree(kept.parent), plant(kept.parent)),
-    "a file without end": lambda kept: os.truncate(kept / "sources" / "a.c", 1 << 40),
-}
-
-POSIX_DAMAGES = {
-    "a pipe for a file": lambda kept: ((kept / "whole.c").unlink(), os.mkfifo(kept / "whole.c")),
-    "a pipe for the folder": lambda kept: (shutil.rmtree(kept), os.mkfifo(kept)),
-    "a link for a file": lambda kept: (
-        (kept / "sources" / "a.c").rename(kept.parents[1] / "same.c"),
-        (kept / "sources" / "a.c").symlink_to(kept.parents[1] / "same.c"),
-    ),
-    "a link for the folder": lambda kept: (
-        kept.rename(kept.parents[1] / "same"),
-        kept.symlink_to(kept.parents[1] / "same"),
-    ),
-}
-
-
-@pytest.mark.parametrize(
-    "damage", [*DAMAGES.values(), *POSIX_DAMAGES.values()], ids=[*DAMAGES, *POSIX_DAMAGES]
-)
-def test_sources_that_have_been_changed_are_made_anew(generation, damage):
-    if damage in POSIX_DAMAGES.values() and os.name != "posix":
-        pytest.skip("needs pipes and links")
-    kept = kept_sources(FILES)
-    assert kept == kept_sources(FILES)
-    damage(kept)
-    assert kept_sources(FILES) == kept
-    found = {p.relative_to(kept).as_posix(): p.read_bytes() for p in kept.rglob("*") if p.is_file()}
-    assert found == FILES
-    assert not any(p.is_symlink() for p in (kept, *kept.rglob("*")))
-
 
 @pytest.fixture
 def place(generation):
@@ -288,10 +237,8 @@ def test_a_file_in_place_of_the_folder_of_answers_is_removed(place):
 
 
 def test_a_generation_that_is_full_is_followed_by_the_next(base, generation):
-    sources = kept_sources(FILES)
     (generation / FULL).touch()
     assert cache_folder() == base / OURS / "generation-2"
-    assert kept_sources(FILES) != sources
     assert generation.exists()  # a compiler may be at work in it
     old(generation / USED)
     assert cache_folder() == base / OURS / "generation-2"
@@ -346,7 +293,7 @@ def test_the_command_shows_the_cache_and_clears_it(base, capsys):
     assert main(["cache"]) == 0
     assert capsys.readouterr().out == f"{base / OURS}\nnothing is kept there\n"
     assert list(base.iterdir()) == []  # showing makes nothing
-    kept_sources(FILES)
+    folder_for("libraries")
     assert main(["cache"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == str(base / OURS)
@@ -364,10 +311,10 @@ def test_clearing_follows_no_link(base, generation, tmp_path):
     (victim / "thesis.tex").touch()
     (generation / "tmp").symlink_to(victim)
     (base / OURS / "generation-2").symlink_to(victim)
-    (base / "supervessel-2").symlink_to(victim)
+    (base / "supervessel-3").symlink_to(victim)
     assert main(["cache", "--clear"]) == 0
     assert (victim / "thesis.tex").exists()
-    assert [path.name for path in base.iterdir()] == ["supervessel-2"]
+    assert [path.name for path in base.iterdir()] == ["supervessel-3"]
 
 
 def test_other_layouts_of_our_making_are_cleared_too(base):
@@ -382,6 +329,7 @@ def test_other_layouts_of_our_making_are_cleared_too(base):
 
 WAITING = """
 import sys, time
+from fmu_build.storage.compiler_files import FOLDER, RECORD
 from fmu_build.storage.temporary import temporary_folder
 with temporary_folder() as folder:
     (folder / "large").write_text("x")
@@ -556,23 +504,49 @@ def test_the_name_of_an_answer_is_all_of_the_question(generation):
     assert place != place_of("trade", scene(body()), "asked otherwise")
 
 
-def test_a_library_that_has_been_damaged_is_compiled_anew(generation):
-    """The compiler believes what it has kept; what we keep stands behind its digest."""
+@pytest.fixture
+def compiled(generation):
+    """Compiles a body's library in a cache that is new."""
     raw = scene(body())
     packed = source_files(generate(raw, 3)[0], 3, raw.name)
     names = source_file_names(generate(raw, 3)[0], 3)
+    return lambda: compile_sources(packed, names, 3, [host_platform()], raw.name, TRIAL_FLAGS)
 
-    def compiled():
-        return compile_sources(packed, names, 3, [host_platform()], raw.name, TRIAL_FLAGS)
 
+def test_a_library_that_has_been_damaged_is_compiled_anew(generation, compiled):
+    """The compiler believes what it has kept; what we keep stands behind its digest."""
     first = compiled()
     (kept,) = (generation / "libraries").iterdir()
-    for damage in (b"", kept.read_bytes()[:-1], bytes(len(kept.read_bytes()))):
+    other = kept.with_name("0" * 64)
+    caches.keep_bytes(other, b"another's")
+    for damage in (b"", kept.read_bytes()[:-1], bytes(len(kept.read_bytes())), other.read_bytes()):
         kept.write_bytes(damage)
         assert compiled() == first
         assert kept.read_bytes()[32:] in first.values()
     objects = [path for path in generation.rglob("*.o") if "whole" in path.name]
     assert objects == []  # nothing compiled from our sources is left for a compiler to believe
+
+
+def test_what_the_compiler_has_kept_for_itself_is_not_believed_where_it_has_changed(
+    base, generation, compiled
+):
+    """An empty library of C, to link with, once gave FMUs that found no function of mathematics."""
+    first = compiled()
+    shutil.rmtree(generation / "libraries")
+    [libm] = (generation / FOLDER).rglob("libm.so.6")
+    libm.write_bytes(b"")
+    assert compiler_files.is_changed(generation / FOLDER)
+    compiler_files._was_changed.cache_clear()  # as in a program that begins
+    assert compiled() == first
+    assert [path.name for path in (base / OURS).glob("*/libraries")] == ["libraries"]
+    assert cache_folder() == base / OURS / "generation-2"
+
+
+def test_a_record_that_has_been_damaged_is_not_believed(generation, compiled):
+    compiled()
+    record = generation / RECORD
+    record.write_bytes(record.read_bytes()[:-1])
+    assert compiler_files.is_changed(generation / FOLDER)
 
 
 def test_a_cache_in_use_is_not_cleared_and_a_clear_leaves_nothing(base, generation, capsys):

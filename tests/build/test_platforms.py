@@ -92,20 +92,20 @@ def test_an_unknown_platform_is_wrong_usage_and_the_nearest_is_named(capsys):
 
 
 def test_a_platform_that_does_not_compile_is_named_with_the_compilers_words(tmp_path: Path):
-    (tmp_path / "model.c").write_text('#ifdef __aarch64__\n#error "not for this machine"\n#endif\n')
+    files = {"model.c": b'#ifdef __aarch64__\n#error "not for this machine"\n#endif\n'}
     both = platforms_named(["x86_64-linux", "aarch64-linux"])
     with pytest.raises(BuildError) as error:
-        compile_binaries(["model.c"], tmp_path, both, 3, "broken")
+        compile_binaries(files, "model.c", both, 3, "broken")
     assert str(error.value).startswith("compiler for aarch64-linux failed:\nmodel.c:2:2: error:")
     assert "not for this machine" in str(error.value)
     assert "x86_64" not in str(error.value)
 
 
 def test_every_platform_that_does_not_compile_is_named(tmp_path: Path):
-    (tmp_path / "model.c").write_text('#error "for no machine"\n')
+    files = {"model.c": b'#error "for no machine"\n'}
     both = platforms_named(["x86_64-linux", "aarch64-linux"])
     with pytest.raises(BuildError) as error:
-        compile_binaries(["model.c"], tmp_path, both, 3, "broken")
+        compile_binaries(files, "model.c", both, 3, "broken")
     for platform in both:
         assert f"compiler for {platform.name} failed:\nmodel.c:1:2: error:" in str(error.value)
 

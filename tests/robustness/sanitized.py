@@ -1,15 +1,16 @@
 """A pytest plugin: FMUs get a library with sanitizers, compiled from the sources that are packed into them.
 
 A violation ends the test process with the sanitizer's report. The process must have been started with the
-address sanitizer's runtime preloaded.
+address sanitizer's runtime preloaded. The name of each library is added to the file SANITIZED_LIBRARIES.
 """
 
 import os
 import subprocess
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import fmu_build.build
+import fmu_build.compile.library
 from fmu_build.compile.compiler import fmi_headers
 from fmu_build.platforms import Platform
 
@@ -18,8 +19,8 @@ SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno
 
 
 def compile_binaries(  # noqa: PLR0917
-    sources: Sequence[str],
-    folder: Path,
+    files: Mapping[str, bytes],
+    main: str,
     platforms: Sequence[Platform],
     fmi: int,
     model_identifier: str,
@@ -30,11 +31,18 @@ def compile_binaries(  # noqa: PLR0917
     flags : of the other compiler, for naught
     """
     [platform] = platforms
-    library = folder / f"{model_identifier}{platform.suffix}"
+    name = f"{model_identifier}{platform.suffix}"
     command = [os.environ["SANITIZING_COMPILER"], *FLAGS, *SANITIZERS, "-isystem", str(fmi_headers())]
     environment = {key: value for key, value in os.environ.items() if key != "LD_PRELOAD"}
-    subprocess.run([*command, "-o", str(library), *sources, "-lm"], cwd=folder, env=environment, check=True)
-    return {f"binaries/{platform.folder(fmi)}/{library.name}": library.read_bytes()}
+    with tempfile.TemporaryDirectory(prefix="supervessel-sanitized-") as folder:
+        for path, content in files.items():
+            file = Path(folder, path)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(content)
+        subprocess.run([*command, "-o", name, main, "-lm"], cwd=folder, env=environment, check=True)
+        with Path(os.environ["SANITIZED_LIBRARIES"]).open("a", encoding="utf-8") as made:
+            made.write(f"{name}\n")
+        return {f"binaries/{platform.folder(fmi)}/{name}": Path(folder, name).read_bytes()}
 
 
-fmu_build.build.compile_binaries = compile_binaries
+fmu_build.compile.library.compile_binaries = compile_binaries

@@ -25,6 +25,8 @@ pytestmark = pytest.mark.robustness
 CALLS = 1_200_000
 TIME_LIMIT = 600.0  # s; the runs take about ten seconds each
 SUITE_TIME_LIMIT = 3600.0  # s; about ten minutes on two cores
+LIBRARIES = 100
+"""The suite flies more of them; fewer would say that it flies others, without sanitizers."""
 PROPAGATORS = [(2, "rk4"), (3, "rk4"), (2, "auto"), (3, "auto"), (3, "split")]
 SCENES = [(fmi, scene) for scene in ("moving", "mixed", "docks", "capture") for fmi in (2, 3)]
 BUILDS = pytest.mark.parametrize(("fmi", "propagator"), [*PROPAGATORS, *SCENES])
@@ -227,6 +229,7 @@ def test_the_fmu_test_suite_runs_clean_on_libraries_with_sanitizers(tmp_path):
     environment = os.environ | {
         "PYTHONPATH": os.pathsep.join([str(here), os.environ.get("PYTHONPATH", "")]),
         "SANITIZING_COMPILER": compiler(),
+        "SANITIZED_LIBRARIES": str(tmp_path / "libraries"),
         "LD_PRELOAD": preloaded(tmp_path),
         "ASAN_OPTIONS": f"{options}:log_path={tmp_path / 'address'}",
         "UBSAN_OPTIONS": f"print_stacktrace=1:log_path={tmp_path / 'undefined'}",
@@ -239,3 +242,4 @@ def test_the_fmu_test_suite_runs_clean_on_libraries_with_sanitizers(tmp_path):
     reports = [path.read_text()[:4000] for path in sorted(tmp_path.glob("*.[0-9]*"))]
     assert reports == []
     assert done.returncode == 0, done.stdout[-4000:]
+    assert len((tmp_path / "libraries").read_text().splitlines()) > LIBRARIES

@@ -4,7 +4,9 @@ A program inherits that a signal is ignored, as SIGINT is in a background job: `
 need, for their own process and for programs that they start.
 """
 
+import functools
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,7 +18,10 @@ from pathlib import Path
 
 import pytest
 
+from fmu_build.compile.compiler import FLAGS, TRIAL_FLAGS, compile_library
+from fmu_build.platforms import host_platform
 from fmu_build.storage.cache import OURS, cache_folder
+from fmu_build.storage.compiler_files import FOLDER, MANIFESTS, RECORD, UNFINISHED, compiler_folder
 
 ROOT = Path(__file__).parents[2]
 
@@ -44,26 +49,52 @@ def heard():
         yield
 
 
-COMPILERS = ("b", "h", "o", "tmp", "z", "sources")
-"""Folders of a cache that are the compiler's."""
-
-
 @pytest.fixture(scope="module", autouse=True)
 def cache() -> Iterator[Path]:
-    """A cache in which nothing has been flown before; what has been compiled before is in it, where the
-    system lets folders be linked. What is removed is never reached by these links."""
-    common = cache_folder()
+    """A cache in which nothing has been flown before, and in which the compiler has its own files."""
     with (
         pytest.MonkeyPatch.context() as patch,
         tempfile.TemporaryDirectory(prefix="supervessel-test-") as name,
     ):
+        begin_cache(Path(name))
         patch.setenv("SUPERVESSEL_CACHE", name)
-        assert cache_folder() == kept_in(Path(name))
-        if os.name == "posix":
-            for kind in COMPILERS:
-                (common / kind).mkdir(exist_ok=True)
-                (cache_folder() / kind).symlink_to(common / kind)
         yield Path(name)
+
+
+def begin_cache(cache: Path) -> None:
+    """Begins a cache with what the compiler has made for itself in the tests' common one.
+
+    Files that it writes once are linked, its manifests are copied: what a test does to its own stays there.
+    """
+    common = _warm()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SUPERVESSEL_CACHE", str(cache))
+        own = cache_folder()
+    assert own == kept_in(cache)
+    for file in common.rglob("*"):
+        name = file.relative_to(common)
+        if name.parts[0] == UNFINISHED:
+            continue
+        new = own / FOLDER / name
+        if file.is_dir():
+            new.mkdir(parents=True, exist_ok=True)
+        elif name.parts[0] == MANIFESTS or os.name != "posix":
+            shutil.copy2(file, new)
+        else:
+            os.link(file, new)
+    if common.with_name(RECORD).exists():  # not while another worker compiles
+        shutil.copy2(common.with_name(RECORD), own / RECORD)
+
+
+@functools.cache
+def _warm() -> Path:
+    """Returns the common folder of the compiler's own files, with what it makes before it compiles ours."""
+    with tempfile.TemporaryDirectory(prefix="supervessel-test-") as name:
+        source = Path(name, "small.c")
+        source.write_text("int answer(void) { return 42; }\n")
+        for flags in (FLAGS, TRIAL_FLAGS):
+            compile_library([source], host_platform(), Path(name, "small"), flags)
+    return compiler_folder()
 
 
 def kept_in(cache: Path) -> Path:

@@ -12,9 +12,8 @@ from shutil import which
 
 import pytest
 
-from fmu_build.storage.cache import cache_folder
 from orbiter.files import Files
-from support.processes import COMPILERS, ROOT, kept_in
+from support.processes import ROOT, begin_cache, kept_in
 from support.signals import ACCURACY, BALL, EXPERIMENT, IMPORT
 
 WATCHDOG = 300.0
@@ -91,7 +90,7 @@ def place_in(folder: Path, *, linked: bool = True) -> Place:
     for name, parts in texts.items():
         (place.work / f"{name}.toml").write_text("".join(parts).format(mass=2.0))
     if linked:
-        link_compiled(place.cache)
+        begin_cache(place.cache)
     return place
 
 
@@ -99,18 +98,6 @@ def place_in(folder: Path, *, linked: bool = True) -> Place:
 def place(tmp_path: Path) -> Place:
     """Folders of a command, with what has been compiled before."""
     return place_in(tmp_path)
-
-
-def link_compiled(cache: Path) -> None:
-    """Begins a cache with links to what the compiler has kept in the tests' own cache."""
-    kept = kept_in(cache)
-    with pytest.MonkeyPatch.context() as patch:
-        common = cache_folder()
-        patch.setenv("SUPERVESSEL_CACHE", str(cache))
-        assert cache_folder() == kept
-    for kind in COMPILERS:
-        (common / kind).mkdir(exist_ok=True)
-        (kept / kind).symlink_to(common / kind)
 
 
 def environment(place: Place, changes: Mapping[str, str | None] | None = None) -> dict[str, str]:

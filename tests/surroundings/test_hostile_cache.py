@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from fmu_build.storage.cache import OURS, TAG, TAG_TEXT
-from support.processes import kept_in
+from fmu_build.storage.compiler_files import FOLDER, MANIFESTS
+from support.processes import begin_cache, kept_in
 from support.surroundings import (
     AS_STRANGER,
     BUILD,
@@ -24,7 +25,6 @@ from support.surroundings import (
     assert_right,
     clean,
     environment,
-    link_compiled,
     needs_linux,
     needs_root,
     place,
@@ -126,14 +126,6 @@ def generation(place):
     return kept_in(place.cache)
 
 
-def unlinked(place):
-    """Puts a copy of the sources into the place of the link to them; returns it."""
-    sources = generation(place) / "sources"
-    sources.unlink()
-    sources.mkdir()
-    return sources
-
-
 FORGED = {
     "constructor": lambda file: file.write_bytes(
         file.read_bytes() + b"\n__attribute__((constructor)) static void f(void) { __builtin_trap(); }\n"
@@ -148,13 +140,46 @@ FORGED = {
 
 
 @pytest.mark.parametrize("forgery", FORGED)
-def test_sources_that_are_forged_are_never_compiled(place, forgery):
-    sources = unlinked(place)
+def test_what_the_compiler_has_kept_is_not_believed_where_it_has_changed(place, forgery):
+    """Each file that it links, and of the others every fortieth."""
     assert_right(run(BUILD, place), place)
-    (place.work / "ball.fmu").unlink()
-    [folder] = sources.iterdir()
-    for file in [*folder.rglob("*.c"), *folder.rglob("*.h")]:
+    kept = generation(place) / FOLDER
+    files = sorted(file for kind in ("b", "o", "z") for file in (kept / kind).rglob("*") if file.is_file())
+    linked = [file for file in files if file.suffix in (".o", ".a") or ".so" in file.name]
+    for file in (*linked, *[file for file in files if file not in linked][::40]):
+        content = file.read_bytes()
+        file.unlink()  # it is a link to the tests' common one
+        file.write_bytes(content)
         FORGED[forgery](file)
+    for library in (generation(place) / "libraries").iterdir():
+        library.unlink()
+    (place.work / "ball.fmu").unlink()
+    assert_right(run(BUILD, place), place)
+    content_is_another = forgery != "mode 0" or os.geteuid() != 0
+    assert (place.cache / OURS / "generation-2").exists() is content_is_another
+
+
+@pytest.mark.parametrize("content", [b"", b"x", b"0 /dev/zero", b"\xff"])
+def test_manifests_of_the_compilers_that_have_changed_are_made_anew(place, content):
+    for file in (generation(place) / FOLDER / MANIFESTS).iterdir():
+        file.write_bytes(content)
+    assert_right(run(BUILD, place), place)
+
+
+@pytest.mark.parametrize("damage", ["constructor", "another's"])
+def test_a_library_that_is_forged_is_compiled_anew(place, damage):
+    assert_right(run(BUILD, place), place)
+    text = (place.work / "ball.toml").read_text()
+    (place.work / "ball.toml").write_text(text.replace("mass = 2.0", "mass = 3.0"))
+    [library] = (generation(place) / "libraries").iterdir()
+    assert run(BUILD, place).status == 0
+    (other,) = set((generation(place) / "libraries").iterdir()) - {library}
+    (place.work / "ball.toml").write_text(text)
+    (place.work / "ball.fmu").unlink()
+    if damage == "constructor":
+        FORGED[damage](library)
+    else:
+        shutil.copy(other, library)
     assert_right(run(BUILD, place), place)
 
 
@@ -206,7 +231,10 @@ def test_results_of_flights_that_are_forged_are_flown_anew(place, flown, forgery
     assert all(file.is_file() and "sha256" in json.loads(file.read_text()) for file in files)
 
 
-NAMES = ("sources", "accuracy", "used", "full", "generation-2", "made-x", "tmp", "h", "o", "z")
+NAMES = (
+    *("libraries", "accuracy", "used", "full", "generation-2", "made-x", "lock"),
+    *("compiler", "compiler.sha256", "compiler/tmp", "compiler/h", "compiler/o", "compiler/z"),
+)
 KINDS = ("file", "fifo", "link", "loop", "folder")
 ODD = [(name, KINDS[(i + j) % 5]) for i, name in enumerate(NAMES) for j in range(2)]
 """Two kinds of things for each name, each kind for four names."""
@@ -220,7 +248,9 @@ def test_whatever_has_a_name_of_ours_in_the_cache_the_result_is_right(place, tmp
     (users / "thesis.tex").write_text("mine")
     os.utime(users / "thesis.tex", (0, 0))
     odd = place.cache / OURS / name if name == "generation-2" else generation(place) / name
-    if os.path.lexists(odd):
+    if odd.is_dir():
+        shutil.rmtree(odd)
+    elif os.path.lexists(odd):
         odd.unlink()
     if kind == "file":
         odd.write_text("[")
@@ -236,7 +266,7 @@ def test_whatever_has_a_name_of_ours_in_the_cache_the_result_is_right(place, tmp
     done = run(BUILD, place)
     assert_clean(done, place)
     assert (users / "thesis.tex").read_text() == "mine"
-    if name in ("tmp", "h", "o", "z") and kind != "folder" and done.status == 1:  # the compiler's own
+    if name.startswith("compiler/") and kind != "folder" and done.status == 1:  # the compiler's own
         assert "`supervessel cache --clear` removes it\n" in done.error
         assert done.made == {}
         return
@@ -244,7 +274,7 @@ def test_whatever_has_a_name_of_ours_in_the_cache_the_result_is_right(place, tmp
 
 
 def test_a_cache_that_is_removed_while_a_build_runs_gives_the_fmu_or_a_line(tmp_path):
-    for number, wanted in enumerate((OURS, "sources", "made-*", "o", "z")):
+    for number, wanted in enumerate((OURS, FOLDER, "made-*", "o", "z")):
         folder = tmp_path / str(number)
         folder.mkdir()
         place = place_in(folder, linked=False)
@@ -301,7 +331,7 @@ def test_a_folder_of_the_users_that_is_named_as_cache_keeps_all_that_is_in_it(pl
         (place.work / kind / "thesis.tex").write_text("mine")
         for path in (place.work / kind / "thesis.tex", place.work / kind):
             os.utime(path, (0, 0))
-    link_compiled({"": place.cache / "supervessel", "~": place.work / "~"}.get(named, place.work))
+    begin_cache({"": place.cache / "supervessel", "~": place.work / "~"}.get(named, place.work))
     before = place.files()
     value = str(place.work) if named == "home" else named
     changes = {"SUPERVESSEL_CACHE": value, "XDG_CACHE_HOME": str(place.cache)}
