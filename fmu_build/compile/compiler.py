@@ -235,13 +235,17 @@ def compiler() -> Path:
 
 
 def _package(name: str) -> Path:
-    """Returns the folder of an installed package, never one in the working folder: that may be anybody's."""
+    """Returns the folder of an installed package, never one in the working folder."""
+    spec = PathFinder.find_spec(name, package_places())
+    if spec is None or spec.origin is None:
+        raise BuildError(f"package {name} is not installed")
+    return Path(spec.origin).parent.absolute()
+
+
+def package_places() -> list[str]:
+    """Returns where Python looks for packages, but for the working folder: what is there may be anybody's."""
     try:
         here = os.path.realpath(Path.cwd())
     except FileNotFoundError:  # it has been removed
         here = ""
-    path = [place for place in sys.path if place and os.path.realpath(place) != here]
-    spec = PathFinder.find_spec(name, path)
-    if spec is None or spec.origin is None:
-        raise BuildError(f"package {name} is not installed")
-    return Path(spec.origin).parent.absolute()
+    return [place for place in sys.path if place and os.path.realpath(place) != here]

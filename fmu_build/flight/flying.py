@@ -178,7 +178,7 @@ def run_host(
         file.write_text(json.dumps(whole))
         command = [sys.executable, "-I", str(HERE / "host.py"), str(file)]
         try:
-            ended = run(command, TIME_LIMIT, environment=_surroundings())
+            ended = run(command, TIME_LIMIT, environment=surroundings_of_python())
         except subprocess.TimeoutExpired:
             return None
         if ended.returncode != 0:
@@ -187,8 +187,8 @@ def run_host(
         return json.loads(ended.stdout), samples.read_bytes()
 
 
-def _surroundings() -> dict[str, str]:
-    """Returns all the variables that a host's process gets: where this Python's own libraries are."""
+def surroundings_of_python() -> dict[str, str]:
+    """Returns all the variables that a process of Python's gets: where its own libraries are."""
     return {name: os.environ[name] for name in (*NEEDED, *LIBRARIES) if name in os.environ}
 
 

@@ -6,8 +6,9 @@ from pathlib import Path
 
 from fmu_build.errors import BuildError
 from fmu_build.flight.experiment import course_of
+from fmu_build.trade.plotting import plot
 from fmu_build.trade.study import is_trade, study
-from fmu_build.trade.table import plot, table
+from fmu_build.trade.table import table
 from supervessel.loading import load_scene, parse_scene
 from supervessel.problems import SceneError, TradeError, printable
 from supervessel.scene.schema import Scene, without_accuracy
@@ -33,10 +34,8 @@ def trade(options: argparse.Namespace) -> int:
             files = {"json": json.dumps(found, indent=1).encode(), "md": f"{tables}\n".encode()}
             try:
                 files |= plot(found)
-            except ImportError:
-                left = [name for name in ("trade.png", "trade.svg") if (folder / name).exists()]
-                earlier = f"; {' and '.join(left)} there are of an earlier trade" if left else ""
-                print_problem(f"no plot: matplotlib is not installed (pip install matplotlib){earlier}")
+            except (ImportError, TradeError) as error:
+                _say_no_plot(folder, error)
             _check_trade_files(folder, options.scene)  # something else may have come there in the meantime
             write_files({folder / f"trade.{kind}": content for kind, content in files.items()})
     except (SceneError, BuildError, OutputError) as error:
@@ -46,6 +45,15 @@ def trade(options: argparse.Namespace) -> int:
         print_problem(f"{printable(options.scene.name)}: {error}")
         return 1
     return print_results(f"{tables}\n\n{folder}", f"the trade is written to {folder}, its tables")
+
+
+def _say_no_plot(folder: Path, error: Exception) -> None:
+    """Says why a trade is without a plot, and that one in its folder is of an earlier trade."""
+    missing = isinstance(error, ImportError)
+    why = "matplotlib is not installed (pip install matplotlib)" if missing else str(error)
+    left = [name for name in ("trade.png", "trade.svg") if (folder / name).exists()]
+    earlier = f"; {' and '.join(left)} there are of an earlier trade" if left else ""
+    print_problem(f"no plot: {why}{earlier}")
 
 
 def _check_trade_files(folder: Path, scene: Path) -> None:

@@ -206,3 +206,28 @@ def test_tables_and_plots_show_every_choice(trade):
     assert drawn["png"].startswith(b"\x89PNG")
     assert drawn["svg"].decode().count("<use ") >= len(trade["choices"])
     assert plot(trade) == drawn
+
+
+@pytest.mark.parametrize(
+    "name", ["matplotlibrc", "matplotlib.py", "sitecustomize.py", "MPLBACKEND", "MATPLOTLIBRC"]
+)
+def test_a_plot_is_drawn_whatever_lies_in_the_working_folder_and_the_surroundings(
+    trade, tmp_path, monkeypatch, name
+):
+    """And nothing is left in the user's home."""
+    drawn = plot(trade)
+    monkeypatch.chdir(tmp_path)
+    home = tmp_path / "home"
+    home.mkdir()
+    monkeypatch.setenv("HOME", str(home))
+    if name.isupper():
+        monkeypatch.setenv(name, str(tmp_path / "missing"))
+    else:
+        (tmp_path / name).write_text("axes.facecolor: red\nbackend: none\nraise SystemExit('planted')\n")
+    assert plot(trade) == drawn
+    assert list(home.iterdir()) == []
+
+
+def test_a_plot_that_cannot_be_drawn_is_told_and_ends(trade):
+    with pytest.raises(TradeError, match=r"^matplotlib ended with status 1: .*Unknown symbol: \\wrong"):
+        plot(trade | {"scene": r"$\wrong$"})
