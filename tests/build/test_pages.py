@@ -19,7 +19,7 @@ FIGURES = {
     "the same bits": "| twin against FMU, composite, rates, steps of `rk4` and `dop853` | 0 ulp |",
     "agree to 1e-13": "agree to 1e-13",
     "at most 3.7 u (1 + cond)": "| 5e9/2e9 | 5e4/5e4, 4 of 18 | 8e4/2e5 | 2e2/4e2 | 3.7/2.2 |",
-    "books close to 6 u": "books close to 6 u of the sum of the terms",
+    "balances to 6 u of the sum": "books close to 6 u of the sum of the terms",
     "1.7 to 2.7 plain RK4 steps": "| torque; attitude and rate: set, step, get | 1.7 to 2.7 |",
     "1/410 of the time": "with the state every 0.1 s 1/410",
     "| 49 ns |": "| 1000 | 8 | 0.08 | 49 |",
