@@ -8,6 +8,7 @@ import pytest
 
 from fmu_build.document.documentation import documentation
 from fmu_build.interface.variable_table import variable_table
+from fmu_build.storage.cache import OURS
 from supervessel import load_scene, parse_scene
 from supervessel.equations import equations
 from support import ISS_DG, OK, body, flying, variant
@@ -80,6 +81,10 @@ def test_the_readme_has_at_most_ten_figures_each_with_its_command():
     rows = text("README.md").partition("## Figures\n")[2].partition("\n## ")[0].split("\n|")[3:]
     assert 0 < len(rows) <= 10
     assert all(COMMAND.search(row.split("|")[-2]) for row in rows)
+
+
+def test_the_page_on_commands_names_the_folder_of_the_cache():
+    assert set(re.findall(r"supervessel-\d+", text("fmu_build/docs/commands.md"))) == {OURS}
 
 
 def test_the_picture_is_what_the_scene_draws():
