@@ -34,7 +34,8 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 MARGIN = 5.0
-"""Least of what is asked over the largest error found: others were up to 3.6 times as large (README)."""
+"""What is asked over the largest error found, at least: others were up to 3.6 times as large, see
+docs/accuracy.md."""
 
 TOLERANCES = tuple(float(f"1e-{k}") for k in range(1, 16))
 

@@ -1,4 +1,4 @@
-"""The README's table of what scenes cost, with times in plain RK4 steps of C: `make bench`."""
+"""The table of what scenes cost in MEASURED.md, with times in plain RK4 steps of C: `make bench`."""
 
 import tempfile
 from pathlib import Path

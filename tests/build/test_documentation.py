@@ -146,7 +146,7 @@ def test_the_page_gives_the_composite_that_the_reference_finds():
     table = rows(made("iss")[2][INDEX])
     assert float(table["mass [kg]"][1]) == 479500.0
     pmi = [float(x) for x in table["pmi [m2]"][1].split(", ")]
-    assert pmi == pytest.approx([404.598, 683.188, 521.120], abs=1e-3)  # as README prints them
+    assert pmi == pytest.approx([404.598, 683.188, 521.120], abs=1e-3)  # as examples/README.md prints them
 
 
 def test_the_page_lists_vessels_and_ports():

@@ -11,6 +11,7 @@ from scipy.special import bdtr, chdtri
 from fmu_build import build_fmu
 from supervessel import Twin, load_scene
 from support import body, scene
+from support.pages import text
 
 DRAWS = 40
 
@@ -30,10 +31,10 @@ def truth(twin) -> np.ndarray:
     return np.append(twin.p_with(TRUTH), twin.x_start[4:])
 
 
-def test_the_example_prints_what_the_readme_says(tmp_path, capsys):
+def test_the_example_prints_what_the_page_says(tmp_path, capsys):
     identify.main(tmp_path)
     printed = capsys.readouterr().out
-    said = re.search(r"^\| \[`identify.py`\].*$", (EXAMPLES.parent / "README.md").read_text(), re.MULTILINE)
+    said = re.search(r"^\| \[`identify.py`\].*$", text("examples/README.md"), re.MULTILINE)
     assert said is not None
     table = {
         line.split("|")[1].strip(): line.split("|")[2:-1] for line in printed.splitlines() if "|" in line

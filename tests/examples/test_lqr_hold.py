@@ -12,8 +12,7 @@ from tanker import EMPTY, FULL, fly, fmu_plant, twin_plant
 from fmu_build import build_fmu
 from supervessel import Twin, load_scene
 from support import EPS, scene, variant
-
-README = (EXAMPLES.parent / "README.md").read_text(encoding="utf-8")
+from support.pages import text
 
 ROUNDING = 1200 * 4 * EPS
 """An attitude read as an output is normalised once more, off by a few u in each of 1200 steps; the loop is
@@ -31,8 +30,8 @@ def rows(table: str) -> dict[str, list[str]]:
     return {row[0]: row[1:] for row in cells[2:]}
 
 
-def in_readme(example: str) -> str:
-    found = re.search(rf"^\| \[`{example}`\].*$", README, re.MULTILINE)
+def on_the_page(example: str) -> str:
+    found = re.search(rf"^\| \[`{example}`\].*$", text("examples/README.md"), re.MULTILINE)
     assert found is not None
     return found[0]
 
@@ -47,12 +46,12 @@ def test_gains_are_those_of_the_closed_form(twin, mass):
     np.testing.assert_allclose(K[:, 3:].T @ K[:, 3:], 2.0 * k * J, atol=1e-7 * k * np.abs(J).max())
 
 
-def test_the_flight_prints_what_the_readme_says(tmp_path, capsys):
+def test_the_flight_prints_what_the_page_says(tmp_path, capsys):
     lqr_hold.main(tmp_path)
     table = rows(capsys.readouterr().out)
     assert table["twin"] == table["FMU"]
     (settles, overshoot, *_, used), late = table["FMU"], table["FMU, gains of the empty tanker"]
-    said = in_readme("lqr_hold.py")
+    said = on_the_page("lqr_hold.py")
     assert f"{settles} s, overshoot {overshoot} %, {used} N m s" in said
     assert f"{late[0]} s, {late[1]} %, {late[-1]} N m s" in said
     assert (tmp_path / "lqr_hold.png").stat().st_size > 10_000
@@ -67,13 +66,13 @@ def test_the_fmu_flies_as_the_twin_does(twin, tmp_path):
     np.testing.assert_allclose(spent, torques, rtol=0.0, atol=ROUNDING * np.abs(gains(twin, FULL)).max())
 
 
-def test_two_fmus_fly_as_the_twin_does_and_as_the_readme_says(tmp_path, capsys):
+def test_two_fmus_fly_as_the_twin_does_and_as_the_page_says(tmp_path, capsys):
     two_fmus.main(tmp_path)
     table = rows(capsys.readouterr().out)
     names = ["twin, controller in CasADi", "two FMUs, FMI 3", "two FMUs, FMI 2"]
     assert [*table] == names
     assert table[names[1]] == table[names[2]] == table[names[0]]
-    assert f"{table[names[1]][0]} s, overshoot {table[names[1]][1]} %" in in_readme("two_fmus.py")
+    assert f"{table[names[1]][0]} s, overshoot {table[names[1]][1]} %" in on_the_page("two_fmus.py")
     assert {path.name for path in tmp_path.iterdir()} == {
         "tanker_2.fmu",
         "tanker_3.fmu",

@@ -9,6 +9,7 @@ import pytest
 from orbiter.points import scene_pmi
 from supervessel import SceneError, Twin, parse_scene, reference
 from support import ISS_DG, OK, flying, relative_error, scene, variant
+from support.pages import text
 
 ROOT = Path(__file__).parents[2]
 
@@ -141,7 +142,7 @@ def test_a_negative_moment_is_refused_at_run_time_too():
         assert fmu.messages()[-1].endswith("DG.pmi = (-1, 1, 1) m2: must be >= 0")
 
 
-def test_the_readmes_figures_of_a_ship_at_mirs_side():
+def test_the_pages_figures_of_a_ship_at_mirs_side():
     raw = tomllib.loads((ROOT / "examples" / "mir_dg.toml").read_text(encoding="utf-8"))
     both = {key: parse_scene(raw | {"convention": key}) for key in ("rigid_body", "orbiter")}
     shown = {}
@@ -152,6 +153,10 @@ def test_the_readmes_figures_of_a_ship_at_mirs_side():
         shown[key] = (*whole.pmi.round(2), *(moments / whole.mass).round(2), round(tilt))
     assert shown["rigid_body"] == (85.66, 174.62, 125.59, 66.31, 144.87, 174.67, 30)
     assert shown["orbiter"] == (85.66, 174.62, 125.59, 85.66, 125.59, 174.62, 0)
+    page = text("model/docs/orbiter.md")
+    for key, numbers in shown.items():
+        pmi, moments = (", ".join(f"{x:.2f}" for x in three) for three in (numbers[:3], numbers[3:6]))
+        assert f"| `{key}` | {pmi} | {moments} |" in page
     apart = []
     for time in (60.0, 600.0):
         twins = [Twin(made, propagator="exact") for made in both.values()]

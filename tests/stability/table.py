@@ -1,4 +1,4 @@
-"""Prints the README's table of the stability suite: the worst error of each propagator by kind of motion.
+"""Prints the stability suite's table in MEASURED.md: the worst error of each propagator by kind of motion.
 
 python -m stability.table     (in tests, five minutes: `make stability`)
 """

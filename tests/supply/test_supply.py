@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+import tarfile
 import tomllib
 import zipfile
 from importlib.metadata import distributions, requires, version
@@ -13,7 +14,8 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-ROOT = Path(__file__).parents[2]
+from support.pages import PAGES, ROOT
+
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 OWN = PROJECT["project"]["name"]
 
@@ -87,6 +89,19 @@ def bill(wheel):
 @pytest.mark.parametrize("package", ["supervessel", "fmu_build"])
 def test_the_wheel_tells_type_checkers_that_its_packages_are_typed(wheel, package):
     assert f"{package}/py.typed" in wheel
+
+
+def test_the_wheel_holds_no_page_whose_links_would_lead_nowhere(wheel):
+    assert [name for name in wheel if name.endswith(".md")] == []
+
+
+def test_the_source_archive_holds_every_page_and_picture(tmp_path):
+    command = [sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", str(tmp_path)]
+    subprocess.run(command, check=True, capture_output=True, cwd=ROOT)
+    (file,) = tmp_path.iterdir()
+    with tarfile.open(file) as archive:
+        held = {name.partition("/")[2] for name in archive.getnames()}
+    assert {*PAGES, "examples/launch_stack.svg", "examples/iss_dg.png"} <= held
 
 
 def needed():

@@ -1,4 +1,4 @@
-"""What a scene costs: the scenes of the README's table, and what is counted of them."""
+"""What a scene costs: the scenes of the table in MEASURED.md, and what is counted of them."""
 
 import tomllib
 from pathlib import Path
@@ -73,7 +73,7 @@ def library_size(scene: Scene) -> int:
 
 
 def table_row(name: str, scene: Scene) -> str:
-    """Returns the name, the operations and the size of a row, as the README has them."""
+    """Returns the name, the operations and the size of a row, as MEASURED.md has them."""
     model = equations(scene)
     composite, everything = operations(model.composite), sum(map(operations, model.functions))
     return f"| {name} | {composite} | {everything} | {library_size(scene) / 1000:.0f} |"

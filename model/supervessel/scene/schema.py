@@ -106,7 +106,7 @@ class Vessel(Table):
     The tensor is taken about the vessel's centre of mass, in vessel axes: its diagonal elements are the
     integrals of y^2 + z^2, z^2 + x^2, x^2 + y^2 over mass, its off-diagonal elements MINUS the integrals of
     x y, x z, y z. Where a data sheet states products of inertia as the integrals themselves, their signs are
-    to be reversed.
+    to be reversed. See model/docs/equations.md, "What an inertia is".
     """
 
     mass: Mass

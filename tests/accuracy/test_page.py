@@ -1,15 +1,14 @@
-"""README's section on accuracy, recomputed."""
+"""The page on accuracy: what it says of a scene that asks for one, recomputed."""
 
 import re
 import tomllib
-from pathlib import Path
 
 from fmu_build.accuracy import said
 from supervessel import choose, parse_scene
 from support import variant
+from support.pages import ROOT, section
 
-ROOT = Path(__file__).parents[2]
-SECTION = (ROOT / "README.md").read_text(encoding="utf-8").partition("## Asking for accuracy\n")[2]
+SECTION = section("fmu_build/docs/accuracy.md", "## Asking for accuracy")
 
 
 def asked(attitude):
@@ -37,7 +36,7 @@ def test_the_line_is_what_the_scene_gives():
 
 
 def test_the_table_is_what_the_scene_gives():
-    rows = re.findall(r"^\| (\S+) \| `.*$", SECTION.partition("\n## ")[0], re.MULTILINE)
+    rows = re.findall(r"^\| (\S+) \| `.*$", SECTION, re.MULTILINE)
     assert len(rows) == 4
     for attitude in rows:
         assert row(float(attitude)) in SECTION
