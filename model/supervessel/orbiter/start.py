@@ -18,6 +18,8 @@ ROUNDED_POSITION = math.sqrt(3.0) * 0.005
 """Length [m] of what rounding to the second decimal, as Orbiter does, leaves of RPOS at most."""
 ROUNDED_ANGLE = 3.0 * math.radians(0.005)
 """Angle [rad] of what rounding to the second decimal leaves of AROT at most: three turns in a row."""
+FARTHEST = 1e150
+"""Largest RPOS [m]: the distance of two such places is still a number."""
 
 
 @dataclass(frozen=True)
@@ -32,16 +34,19 @@ class Saved:
 def saved_motion(ship: Ship, problems: list[str]) -> Saved:
     """Returns what a ship's lines say; what cannot be read goes to `problems`."""
 
-    def read(key: str) -> tuple[float, ...] | None:
+    def read(key: str, allowed: str = "", most: float = math.inf) -> tuple[float, ...] | None:
         entry = ship.entry(key)
         if entry is None:
             return None
         found = numbers(entry.words, 3)
-        if found is None:
-            problems.append(f"{entry.place}: {quantity(ship.name)}: {entry}: must be {key} and three numbers")
+        if found is None or any(abs(x) > most for x in found):
+            must = f"must be {key} and three numbers{allowed}"
+            problems.append(f"{entry.place}: {quantity(ship.name)}: {entry}: {must}")
+            return None
         return found
 
-    arot, vrot, rpos = read("AROT"), read("VROT"), read("RPOS")
+    arot, vrot = read("AROT"), read("VROT")
+    rpos = read("RPOS", f" of at most {FARTHEST:g} m", FARTHEST)
     rate = np.radians(mirrored(vrot)) if vrot and not ship.landed else None
     return Saved(rotation(arot) if arot else None, rate, np.array(mirrored(rpos)) if rpos else None)
 
@@ -96,8 +101,8 @@ def _stale(
         far = [f"{math.degrees(angle):.2f} degrees"] if angle > 2.0 * ROUNDED_ANGLE else []
         if one.position is not None and other.position is not None:
             offset = origin - poses[base][1]
-            distance = float(np.linalg.norm(R_inertial_root.T @ (other.position - one.position) - offset))
-            if distance > 2.0 * ROUNDED_POSITION + float(np.linalg.norm(offset)) * ROUNDED_ANGLE:
+            distance = math.hypot(*(R_inertial_root.T @ (other.position - one.position) - offset))
+            if distance > 2.0 * ROUNDED_POSITION + math.hypot(*offset) * ROUNDED_ANGLE:
                 far.append(f"{distance:.2f} m")
         if far:
             where = f"{' and '.join(far)} from where its docks to {quantity(base)} have it"
