@@ -29,7 +29,7 @@ COMMANDS = {"build": BUILD, "choice": CHOICE, "trade": TRADE, "import": IMPORT, 
 MADE = {
     BUILD: {"ball.fmu"},
     CHOICE: {"choice.fmu"},
-    TRADE: {"out", "out/trade.json", "out/trade.md", "out/trade.png"},
+    TRADE: {"out", "out/trade.json", "out/trade.md", "out/trade.png", "out/trade.svg"},
     IMPORT: {"side.toml"},
     CACHE: set(),
 }
