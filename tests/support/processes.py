@@ -13,7 +13,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -64,26 +64,30 @@ def cache() -> Iterator[Path]:
 def begin_cache(cache: Path) -> None:
     """Begins a cache with what the compiler has made for itself in the tests' common one.
 
-    Files that it writes once are linked, its manifests are copied: what a test does to its own stays there.
+    Files that it writes once are linked; its manifests are copied, before what they name: what a test does to
+    its own stays there.
     """
     common = _warm()
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SUPERVESSEL_CACHE", str(cache))
         own = cache_folder()
     assert own == kept_in(cache)
-    for file in common.rglob("*"):
-        name = file.relative_to(common)
-        if name.parts[0] == UNFINISHED:
-            continue
-        new = own / FOLDER / name
-        if file.is_dir():
+    for kind in (MANIFESTS, *sorted({path.name for path in common.iterdir()} - {MANIFESTS, UNFINISHED})):
+        for place, _, names in os.walk(common / kind):
+            new = own / FOLDER / Path(place).relative_to(common)
             new.mkdir(parents=True, exist_ok=True)
-        elif name.parts[0] == MANIFESTS or os.name != "posix":
-            shutil.copy2(file, new)
-        else:
-            os.link(file, new)
+            for name in names:
+                with suppress(FileNotFoundError):  # of another worker's compiler, which goes on
+                    _give(Path(place, name), new / name, linked=kind != MANIFESTS)
     if common.with_name(RECORD).exists():  # not while another worker compiles
         shutil.copy2(common.with_name(RECORD), own / RECORD)
+
+
+def _give(file: Path, new: Path, *, linked: bool) -> None:
+    if linked and os.name == "posix":
+        os.link(file, new)
+    else:
+        shutil.copy2(file, new)
 
 
 @functools.cache
