@@ -8,8 +8,9 @@ import pytest
 from fmu_build.flight.choices import Choice, Model, variant_of
 from supervessel import SceneError, parse_scene
 from supervessel.scene.schema import without_accuracy
-from support import ISS_DG, variant
+from support import BALL, ISS_DG, variant
 from support.processes import interrupted, needs_posix, run
+from support.scenes import ACCURACY_ASKED
 from support.signals import KEPT
 
 ACCURACY = {"attitude": 1e-4, "rate": 1e-6, "horizon": 600.0, "step": 0.1}
@@ -110,23 +111,6 @@ def test_docks_need_no_range():
     assert not parse_scene(variant(SCENE, {"docks": docks, "inputs": inputs})).is_chosen
 
 
-TEXT = """\
-name = "ball"
-root = "B"
-[vessels.B]
-mass = 1.0
-pmi = [1.0, 1.6, 2.4]
-[inputs]
-torque = true
-[inputs.range]
-torque = [-0.1, 0.1]
-[accuracy]
-attitude = 1e-6
-horizon = 5.0
-step = 0.1
-"""
-
-
 def command(limit=""):
     build = f"{sys.executable} -m fmu_build ball.toml"
     return ["sh", "-c", f"{limit}exec {build}"]
@@ -134,7 +118,7 @@ def command(limit=""):
 
 @needs_posix
 def test_an_interrupt_keeps_whole_results_and_leaves_no_fmu(tmp_path, cache):
-    (tmp_path / "ball.toml").write_text(TEXT)
+    (tmp_path / "ball.toml").write_text(BALL + ACCURACY_ASKED)
     done, kept = interrupted(command(), tmp_path, cache, "accuracy")
     assert (done.returncode, done.stdout, done.stderr) == (130, "", f"{KEPT}\n")
     assert [path.name for path in tmp_path.iterdir()] == ["ball.toml"]
@@ -149,7 +133,7 @@ def test_an_interrupt_keeps_whole_results_and_leaves_no_fmu(tmp_path, cache):
 @needs_posix
 def test_a_full_disk_is_said_and_leaves_nothing_half_written(tmp_path, cache):
     """The room suffices for no history of inputs."""
-    (tmp_path / "ball.toml").write_text(TEXT.replace("horizon = 5.0", "horizon = 5.1"))
+    (tmp_path / "ball.toml").write_text(BALL + ACCURACY_ASKED.replace("horizon = 5.0", "horizon = 5.1"))
     done = run(command("ulimit -f 1; "), tmp_path, cache)
     assert (done.returncode, done.stdout) == (1, "")
     assert "Traceback" not in done.stderr

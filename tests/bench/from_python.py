@@ -27,7 +27,6 @@ from fmu_build.platforms import host_platform
 from supervessel import Twin, load_scene, parse_scene
 from supervessel.twin.functions import TwinFunction
 
-Array = NDArray[np.float64]
 Plain = Callable[[], float]
 
 HERE = Path(__file__).parent
@@ -145,7 +144,7 @@ def by_scipy(folder: Path, _: str) -> Iterator[Flight]:
     run, at = twin.generate(folder / "scipy", ["ode"], derivatives=0)["ode"].in_place()
     at["u"][:] = TORQUE
 
-    def rate(_: float, x: Array) -> Array:
+    def rate(_: float, x: NDArray[np.float64]) -> NDArray[np.float64]:
         at["x"][:] = x
         run()
         return at["x_dot"].copy()
@@ -169,7 +168,7 @@ def by_mujoco(folder: Path, _: str) -> Iterator[Flight]:
         "</mujoco>"
     )
 
-    def fly(steps: int) -> Array:
+    def fly(steps: int) -> NDArray[np.float64]:
         model.opt.timestep = DURATION / steps
         body = mujoco.MjData(model)
         body.qvel[3:] = RATES

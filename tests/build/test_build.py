@@ -20,12 +20,12 @@ from fmu_build.generate.model import generate
 from fmu_build.generate.sources import source_file_names, source_files
 from fmu_build.platforms import PLATFORMS, host_platform
 from supervessel import load_scene
-from support import ISS_DG, body, built, scene, variant
+from support import BALL, ISS_DG, body, built, scene, variant
+from support.marks import FMI
 
 LAYER = Path(fmu_build.__file__).parent / "c"
 NOSE = "vessels.DG.ports.nose"
 BARE = variant(ISS_DG, {"inputs": None, "outputs.names": []})
-both_versions = pytest.mark.parametrize("fmi", [2, 3])
 needs_elf = pytest.mark.skipif(sys.platform != "linux", reason="reads ELF, the library format of Linux")
 
 
@@ -35,7 +35,7 @@ def token(raw: dict[str, Any], fmi: int = 3) -> str:
     return root.get("instantiationToken" if fmi == 3 else "guid") or ""
 
 
-@both_versions
+@FMI
 def test_a_scene_gives_the_same_bytes_in_every_folder(tmp_path, fmi):
     paths = [tmp_path / "one" / "a.fmu", tmp_path / "other" / "folder" / "b.fmu"]
     for path in paths:
@@ -45,7 +45,7 @@ def test_a_scene_gives_the_same_bytes_in_every_folder(tmp_path, fmi):
     assert one == other
 
 
-@both_versions
+@FMI
 def test_the_archive_holds_one_library_and_what_the_standard_has_beside_it(fmi):
     folder = host_platform().folder(fmi)
     with zipfile.ZipFile(built(ISS_DG, fmi)) as archive:
@@ -57,7 +57,7 @@ def test_the_archive_holds_one_library_and_what_the_standard_has_beside_it(fmi):
     assert folders == beside | icon
 
 
-@both_versions
+@FMI
 def test_the_library_carries_the_token_of_the_description(fmi):
     with zipfile.ZipFile(built(ISS_DG, fmi)) as archive:
         library, description = archive.read(archive.namelist()[0]), archive.read("modelDescription.xml")
@@ -88,12 +88,9 @@ def test_the_library_carries_the_token_of_the_description(fmi):
     ],
     ids=lambda change: next(iter(change)),
 )
-@both_versions
+@FMI
 def test_a_change_of_the_scene_changes_the_token(change, fmi):
     assert token(variant(ISS_DG, change), fmi) != token(ISS_DG, fmi)
-
-
-BALL = 'name = "ball"\nroot = "B"\n[vessels.B]\nmass = 2.0\npmi = [1.0, 1.5, 2.0]\n'
 
 
 @pytest.mark.parametrize(
@@ -156,7 +153,7 @@ LOCALS = [*STATES, *(f"der({state})" for state in STATES)]
     ],
     ids=["none", "torque", "masses", "pmi", "pose"],
 )
-@both_versions
+@FMI
 def test_the_description_has_only_what_the_scene_lists(inputs, outputs, input_names, output_names, fmi):
     raw = variant(ISS_DG, {"inputs": inputs, "outputs.names": outputs})
     root = ET.fromstring(generate(scene(raw), fmi)[1])
@@ -205,7 +202,7 @@ def test_a_compiler_that_fails_is_quoted_with_file_and_line(tmp_path):
     assert not library.exists()
 
 
-@both_versions
+@FMI
 def test_a_scene_whose_c_does_not_compile_is_refused_in_the_compilers_words(fmi):
     sources = generate(scene(body()), fmi)[0] | {"model.c": BROKEN_C}
     packed, names = source_files(sources, fmi, "body"), source_file_names(sources, fmi)
@@ -256,7 +253,7 @@ SHAPES = {
 
 @pytest.mark.parametrize("raw", SHAPES.values(), ids=SHAPES)
 @pytest.mark.parametrize("compiler", COMPILERS)
-@both_versions
+@FMI
 def test_the_hand_written_c_compiles_without_warnings(tmp_path, fmi, compiler, raw):
     command = COMPILERS[compiler]
     if shutil.which(command[0]) is None:
@@ -347,19 +344,19 @@ def test_the_standard_has_75_functions_in_version_3():
 
 
 @needs_elf
-@both_versions
+@FMI
 def test_the_library_exports_the_functions_of_the_standard_and_no_other(fmi):
     assert library(fmi).exported == declared_functions(fmi)
 
 
 @needs_elf
-@both_versions
+@FMI
 def test_the_library_needs_the_c_library_alone(fmi):
     assert library(fmi).needed <= {"libc.so.6", "libm.so.6"}
 
 
 @needs_elf
-@both_versions
+@FMI
 def test_the_library_runs_with_glibc_2_17(fmi):
     versions = {tuple(map(int, name.removeprefix("GLIBC_").split("."))) for name in library(fmi).versions}
     assert (2, 2, 5) in versions or host_platform() is not PLATFORMS[0]

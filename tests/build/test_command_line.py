@@ -12,20 +12,13 @@ import pytest
 from fmpy import read_model_description
 
 from supervessel.problems import printable
+from support import BALL
 from support.compilers import fake_compiler
 from support.processes import needs_posix
 
 ROOT = Path(__file__).parents[2]
 
-SCENE = """\
-name = "ball"
-root = "B"
-[vessels.B]
-mass = 2.0
-pmi = [1.0, 1.5, 2.0]
-"""
-
-BROKEN = SCENE.replace("mass = 2.0", "mass = -2.0").replace('root = "B"', 'root = "C"') + "colour = 3\n"
+BROKEN = BALL.replace("mass = 2.0", "mass = -2.0").replace('root = "B"', 'root = "C"') + "colour = 3\n"
 
 BROKEN_PROBLEMS = [
     "ball.toml: vessels.B.mass = -2.0 kg: must be a finite number >= 0",
@@ -42,7 +35,7 @@ needs_root = pytest.mark.skipif(
 @pytest.fixture
 def folder(tmp_path):
     """A folder to run in, with a scene."""
-    (tmp_path / "ball.toml").write_text(SCENE)
+    (tmp_path / "ball.toml").write_text(BALL)
     return tmp_path
 
 
@@ -163,15 +156,15 @@ def test_a_folder_that_takes_no_files_is_named(folder):
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
 
 
-TOO_LONG = SCENE.replace("2.0", "9" * 5000, 1)
-TOO_DEEP = SCENE.replace("2.0", "[" * 5000 + "]" * 5000, 1)
-NO_NAMES = SCENE.replace("[vessels.B]", 'docks = [{ports = [["B.p"], ["B.q"]]}]\n[vessels.B]')
-OVERFLOWING = SCENE.replace("2.0", "1e308", 1).replace("1.0, 1.5, 2.0", "10.0, 10.0, 10.0")
+TOO_LONG = BALL.replace("2.0", "9" * 5000, 1)
+TOO_DEEP = BALL.replace("2.0", "[" * 5000 + "]" * 5000, 1)
+NO_NAMES = BALL.replace("[vessels.B]", 'docks = [{ports = [["B.p"], ["B.q"]]}]\n[vessels.B]')
+OVERFLOWING = BALL.replace("2.0", "1e308", 1).replace("1.0, 1.5, 2.0", "10.0, 10.0, 10.0")
 
 
 @pytest.mark.parametrize(
     "text",
-    [SCENE.replace("=", ":", 1), b"# \xff\n", TOO_LONG, TOO_DEEP, NO_NAMES, OVERFLOWING],
+    [BALL.replace("=", ":", 1), b"# \xff\n", TOO_LONG, TOO_DEEP, NO_NAMES, OVERFLOWING],
     ids=["no TOML", "no UTF-8", "5000 digits", "arrays 5000 deep", "docks of arrays", "overflowing"],
 )
 def test_a_scene_that_is_refused_gives_one_line_and_no_traceback(folder, text):
@@ -264,7 +257,7 @@ def test_a_cache_that_cannot_be_written_is_named(folder):
 def homeless(tmp_path_factory):
     """A build with a HOME that cannot be written: the run, its folder and its temporary folder."""
     folder, temporary = tmp_path_factory.mktemp("work"), tmp_path_factory.mktemp("temporary")
-    (folder / "ball.toml").write_text(SCENE)
+    (folder / "ball.toml").write_text(BALL)
     home = folder / "ball.toml" / "home"
     cleared = dict.fromkeys(
         ("XDG_CACHE_HOME", "SUPERVESSEL_CACHE", "ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR")

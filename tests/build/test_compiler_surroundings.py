@@ -12,6 +12,7 @@ from fmu_build import BuildError
 from fmu_build.compile.compiler import compile_library
 from fmu_build.platforms import host_platform
 from fmu_build.storage.cache import cache_folder
+from support import BALL
 from support.compilers import fake_compiler
 from support.processes import ROOT, cache, needs_posix
 
@@ -19,16 +20,7 @@ __all__ = ["cache"]
 
 needs_linux = pytest.mark.skipif(sys.platform != "linux", reason="an environment is read in /proc")
 
-SCENE = """\
-name = "ball"
-root = "B"
-[vessels.B]
-mass = 2.0
-pmi = [1.0, 1.5, 2.0]
-[experiment]
-duration = 2.0
-step = 1.0
-"""
+SCENE = BALL + "[experiment]\nduration = 2.0\nstep = 1.0\n"
 
 HOSTILE = (
     "CCC_OVERRIDE_OPTIONS",

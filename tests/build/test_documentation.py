@@ -21,6 +21,7 @@ from supervessel import parse_scene
 from supervessel.equations import equations
 from supervessel.scene.schema import PROPAGATOR_NAMES, Law
 from support import ISS_DG, body, variant
+from support.marks import FMI
 
 VOID = {"meta", "br", "hr", "img", "link", "input"}
 SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
@@ -106,7 +107,7 @@ def checked(html):
     return parser
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 @pytest.mark.parametrize("name", SCENES)
 def test_the_page_is_well_formed(name, fmi):
     html = made(name, fmi)[2][INDEX]
@@ -191,13 +192,13 @@ def test_nothing_that_a_name_or_a_description_holds_becomes_markup():
     assert terminals.find(".//Terminal").get("name") == "DG.nose"
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 def test_documentation_is_the_same_each_time(fmi):
     scene, entries, files = made("iss", fmi)
     assert documentation(scene, entries, fmi) == files
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 @pytest.mark.parametrize("name", SCENES)
 def test_files_stand_where_the_standard_wants_them(name, fmi):
     files = made(name, fmi)[2]
@@ -210,7 +211,7 @@ def test_files_stand_where_the_standard_wants_them(name, fmi):
             assert path.removesuffix("svg") + "png" in files
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 @pytest.mark.parametrize("name", SCENES)
 def test_terminals_fit_the_schema_and_name_what_is_there(name, fmi):
     scene, entries, files = made(name, fmi)
@@ -267,7 +268,7 @@ def test_terminals_of_one_model_do_not_cover_each_other():
     assert all(below[1] < above[0] for below, above in pairwise(spans))
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 def test_the_licence_folder_holds_the_texts_that_its_overview_names(fmi):
     files = licence_files(fmi)
     overview = files["documentation/licenses/license.txt"].decode()

@@ -21,6 +21,7 @@ from supervessel import SceneError, Twin, output_expressions, parse_scene
 from supervessel.equations import equations
 from supervessel.scene import inputs, outputs, schema
 from support import OK, Instance, body, variant
+from support.marks import FMI
 
 MODEL, BUILD = Path(supervessel.__path__[0]), Path(fmu_build.__path__[0])
 
@@ -145,7 +146,7 @@ def test_a_new_kind_of_input_acts_in_a_trade():
 
 
 @pytest.mark.usefixtures("new_kinds")
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 def test_a_new_kind_of_input_and_an_output_are_in_the_fmu(fmi):
     it = Instance(WITH_BOTH, fmi, optimised=False)
     it.initialise()

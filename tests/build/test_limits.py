@@ -16,12 +16,11 @@ from supervessel.orbiter import ScenarioError, import_scenario
 from supervessel.problems import MOST_PROBLEMS, MOST_SUGGESTIONS
 from supervessel.scene.names import LONGEST_NAME, MOST_MOVING, MOST_VESSELS
 from supervessel.shell.reading import DEEPEST, LARGEST_TEXT, LARGEST_TOML, LONGEST_LINE, MOST_PARTS
-from support import ISS_DG, body, variant
+from support import BALL, ISS_DG, body, variant
 
 WATCHDOG = 300
 """Seconds: what is quadratic in the size of its input takes many times that, everything else a few."""
 
-BALL = 'name = "ball"\nroot = "B"\n[vessels.B]\nmass = 1.0\npmi = [1.0, 1.0, 1.0]\n'
 PORT = "position = [0, 0, 0]\ndirection = [1, 0, 0]\nalignment = [0, 1, 0]\n"
 
 needs_posix = pytest.mark.skipif(os.name != "posix", reason="needs alarms, FIFOs and device files")
@@ -89,7 +88,7 @@ TOO_MUCH = {
         "line 7: a key of 400 parts",
     ),
     "480 brackets": (
-        BALL.replace("mass = 1.0", f"mass = {'[' * 480}{']' * 480}"),
+        BALL.replace("mass = 2.0", f"mass = {'[' * 480}{']' * 480}"),
         f"line 4: brackets 480 deep; at most {DEEPEST} are possible",
     ),
     "one bracket too many": (

@@ -13,17 +13,13 @@ import pytest
 from fmu_build import BuildError, build, build_fmu
 from orbiter.files import Files
 from supervessel import Twin, commands, load_scene
-from support import processes
+from support import BALL, processes
 from support.processes import cache, needs_posix
 
 __all__ = ["cache"]
 
-SCENE = """\
-name = "ball"
-root = "B"
-[vessels.B]
-mass = 2.0
-pmi = [1.0, 1.5, 2.0]
+SCENE = f"""\
+{BALL}
 [rotation]
 law = "none"
 angular_velocity = [0.01, 0.02, 0.03]

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from supervessel import SceneError, load_scene, parse_scene
-from support import ISS_DG, body, random_rotation, variant
+from support import BALL, ISS_DG, body, random_rotation, variant
 
 NOSE = "vessels.DG.ports.nose"
 PORT = {"position": [0.0, 0.0, 0.0], "direction": [1.0, 0.0, 0.0], "alignment": [0.0, 1.0, 0.0]}
@@ -723,9 +723,6 @@ def test_problems_come_in_the_same_order_every_time():
     }
 
 
-SPHERE = 'name = "ball"\nroot = "B"\n[vessels.B]\nmass = 1.0\npmi = [1.0, 1.0, 1.0]\n'
-
-
 def refusal(path: Path, text: str | bytes | None = None) -> str:
     """Returns what a scene file is refused with, after writing it if there is a text."""
     if text is not None:
@@ -736,7 +733,7 @@ def refusal(path: Path, text: str | bytes | None = None) -> str:
 
 
 def test_every_line_of_the_message_begins_with_the_file_name(tmp_path):
-    text = SPHERE.replace("mass = 1.0", "mass = -1.0").replace('root = "B"', 'root = "C"')
+    text = BALL.replace("mass = 2.0", "mass = -1.0").replace('root = "B"', 'root = "C"')
     assert refusal(tmp_path / "ball.toml", text) == (
         f'ball.toml: vessels.B.mass = -1.0 kg: {NUMBER}\nball.toml: root: unknown vessel "C"; known: B'
     )
@@ -744,7 +741,7 @@ def test_every_line_of_the_message_begins_with_the_file_name(tmp_path):
 
 def test_the_problems_of_an_error_are_its_lines_without_the_file_name(tmp_path):
     path = tmp_path / "ball.toml"
-    path.write_text(SPHERE.replace("pmi", "pmii"))
+    path.write_text(BALL.replace("pmi", "pmii"))
     with pytest.raises(SceneError) as caught:
         load_scene(path)
     assert str(caught.value) == "\n".join(f"ball.toml: {problem}" for problem in caught.value.problems)
@@ -754,12 +751,12 @@ def test_the_problems_of_an_error_are_its_lines_without_the_file_name(tmp_path):
     ("text", "expected"),
     [
         (
-            SPHERE.replace("mass =", "mass"),
+            BALL.replace("mass =", "mass"),
             "Expected '=' after a key in a key/value pair (at line 4, column 6)",
         ),
-        (SPHERE + "mass = 2.0\n", "Cannot overwrite a value (at line 6, column 11)"),
-        (SPHERE.replace("1.0,", "1.0;", 1), "Unclosed array (at line 5, column 11)"),
-        (SPHERE + "[vessels.B]\n", "Cannot declare ('vessels', 'B') twice (at line 6, column 11)"),
+        (BALL + "mass = 2.0\n", "Cannot overwrite a value (at line 6, column 11)"),
+        (BALL.replace("1.0,", "1.0;", 1), "Unclosed array (at line 5, column 11)"),
+        (BALL + "[vessels.B]\n", "Cannot declare ('vessels', 'B') twice (at line 6, column 11)"),
     ],
     ids=["no equals sign", "key twice", "semicolon", "table twice"],
 )
@@ -786,11 +783,11 @@ def test_a_file_that_is_not_utf8_is_named_with_the_byte(tmp_path):
 @parametrised("value", ["9" * 5000, "[" * 5000 + "]" * 5000], ids=["5000 digits", "arrays 5000 deep"])
 def test_a_value_that_the_toml_reader_gives_up_on_is_refused(tmp_path, value):
     path = tmp_path / "ball.toml"
-    text = SPHERE.replace("mass = 1.0", f"mass = {value}")
+    text = BALL.replace("mass = 2.0", f"mass = {value}")
     assert "ball.toml: " in refusal(path, text)
 
 
 def test_an_integer_too_long_to_print_is_refused_with_its_place(tmp_path):
-    message = refusal(tmp_path / "ball.toml", SPHERE.replace("mass = 1.0", f"mass = 0x{'f' * 5000}"))
+    message = refusal(tmp_path / "ball.toml", BALL.replace("mass = 2.0", f"mass = 0x{'f' * 5000}"))
     assert message.startswith("ball.toml: vessels.B.mass = ")
     assert "kg: must be" in message

@@ -18,6 +18,7 @@ from fmu_build.compile.compiler import fmi_headers
 from fmu_build.generate.sources import layer_files, source_file_names, source_files
 from fmu_build.storage.cache import cache_folder
 from support import ISS_DG, body, built
+from support.marks import FMI
 
 STEP, STEPS = 0.1, 100
 """s, and how many: long enough for a difference of one ulp to grow."""
@@ -108,7 +109,7 @@ def flight(folder: Path) -> np.ndarray:
     return result
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 def test_every_header_included_is_packed_or_the_standards_or_the_c_librarys(fmi):
     files = packed_sources(fmi)
     for name, text in files.items():
@@ -125,21 +126,21 @@ def test_only_the_layer_of_the_version_is_packed(fmi, other):
     assert not [name for name in names if name.startswith(other)]
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 def test_every_c_file_is_to_be_compiled(fmi):
     listed = source_file_names(GENERATED, fmi)
     packed = source_files(GENERATED, fmi, "name")
     assert [f"sources/{name}" for name in listed] == [name for name in packed if name.endswith(".c")]
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 def test_generated_files_do_not_hide_those_of_the_layer(fmi):
     files = packed_sources(fmi)
     for name, text in layer_files(fmi).items():
         assert files[name].endswith(text)
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 def test_no_source_file_fixes_a_prefix_of_the_function_names(fmi):
     for name, text in packed_sources(fmi).items():
         assert "FUNCTION_PREFIX" not in text, name
@@ -173,7 +174,7 @@ def test_fmi_2_lists_its_source_files_in_the_model_description():
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 def test_the_sources_compile_to_a_library_with_bit_identical_results(tmp_path, fmi, compiler):
     fmpy.extract(str(built(ISS_DG, fmi)), unzipdir=str(tmp_path))
     expected = flight(tmp_path)
@@ -182,7 +183,7 @@ def test_the_sources_compile_to_a_library_with_bit_identical_results(tmp_path, f
     assert flight(tmp_path).tobytes() == expected.tobytes()
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 def test_all_names_that_a_linker_sees_are_fmis_or_begin_with_the_models(tmp_path, fmi):
     fmpy.extract(str(built(ISS_DG, fmi)), unzipdir=str(tmp_path))
     names = exported(compiled(tmp_path, fmi, COMPILERS["gcc"], "-O0"))

@@ -15,11 +15,9 @@ from fmu_build.trade import TradeError
 from orbiter.files import Files
 from supervessel import SceneError, load_scene, parse_scene
 from supervessel.problems import LONGEST_PROBLEM, LONGEST_WORD, UNSEEN, printable
-from support import ISS_DG, variant
+from support import BALL, ISS_DG, variant
 
 ROOT = Path(__file__).parents[2]
-BALL = 'name = "ball"\nroot = "B"\n[vessels.B]\nmass = 1.0\npmi = [1.0, 1.0, 1.0]\n'
-
 HOSTILE = {
     "a terminal sequence": ("\x1b[31mred", r"\x1b[31mred"),
     "a title of a terminal": ("\x1b]0;x\x07", r"\x1b]0;x\x07"),
@@ -208,7 +206,7 @@ needs_bytes = pytest.mark.skipif(sys.platform != "linux", reason="needs file nam
 @pytest.mark.parametrize("module", ["fmu_build", "supervessel"])
 def test_commands_name_any_file_in_any_locale_in_a_line(tmp_path, module, environment):
     name = b"\xff\x1b[31m\xe2\x80\xae\n\xc3\xbc"
-    (tmp_path / os.fsdecode(name)).write_text(BALL.replace("1.0", "-1.0", 1) + '"\\u202eü" = 1\n')
+    (tmp_path / os.fsdecode(name)).write_text(BALL.replace("2.0", "-2.0", 1) + '"\\u202eü" = 1\n')
     arguments = [name] if module == "fmu_build" else ["import", name, "-o", b"new" + name]
     for given in (arguments, [*arguments, b"more" + name]):
         done = run(module, tmp_path, *given, **environment)

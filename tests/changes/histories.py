@@ -8,13 +8,11 @@ from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from supervessel import Scene, Twin, reference
-from support import OK, Instance, random_rotation, scene
+from support import OK, Array, Instance, random_rotation, scene
 
-Array = NDArray[np.float64]
 Values = dict[str, float]
 Long = np.longdouble
 

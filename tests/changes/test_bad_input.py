@@ -11,8 +11,8 @@ from changes.histories import Values, elements
 from changes.test_exchange import TUG
 from fmu.test_saved_state import bytes_of, restore
 from support import DISCARD, EPS, OK, Instance, variant
+from support.marks import FMI
 
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 NAN, INF = float("nan"), float("inf")
 
 # With a second vessel on the tank, and places at which docks cannot be closed.

@@ -10,6 +10,7 @@ from hypothesis import Phase, given, settings
 from changes.histories import ByExchange, ByFmu, ByTwin, Driver, Values, elements
 from supervessel import reference
 from support import DISCARD, EPS, ISS_DG, OK, Instance, scene
+from support.marks import FMI
 
 # The station and the ship of Orbiter, converted to right-handed axes.
 MIR: dict[str, Any] = {
@@ -90,7 +91,7 @@ def test_the_diagonal_alone_would_turn_the_axis_by_a_degree_and_a_half():
     assert np.degrees(angle) == pytest.approx(1.455, abs=5e-4)
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 def test_an_occupied_port_is_refused_by_name(fmi):
     instance = Instance(MIR, fmi)
     assert instance.initialise() == OK
@@ -140,7 +141,7 @@ def test_reads_and_sets_on_the_way_leave_no_trace():
     assert found[0] == found[1]
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 def test_a_saved_state_goes_back_over_a_docking(fmi):
     instance = Instance(MIR, fmi)
     assert instance.initialise() == OK

@@ -20,8 +20,8 @@ from changes.test_exchange import DURATION, MIXED, STEADY, TUG, drawn_in
 from fmu.test_intermediate_update import Listener
 from fmu.test_saved_state import bytes_of, restore
 from support import DISCARD, EPS, OK, Instance, scene, variant
+from support.marks import FMI
 
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 SCENES = pytest.mark.parametrize("raw", [TUG, MIXED, STEADY], ids=["momentum", "mixed", "rate"])
 GONE = {"held.docked": 0.0}
 MOVED = drawn_in(DURATION / 2)

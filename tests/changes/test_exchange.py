@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from changes.histories import ByEvents, ByExchange, ByFmu, Values, elements, start_values
 from supervessel import reference
 from support import DISCARD, EPS, ERROR, OK, Instance, scene, variant
+from support.marks import FMI
 
 # A tug with a tank on an arm that an importer may drive.
 TUG: dict[str, Any] = {
@@ -83,7 +84,7 @@ def truth(raw: dict[str, Any], by_momentum: bool) -> np.ndarray:
     return np.concatenate([y[:4] / np.linalg.norm(y[:4]), omega])
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 @pytest.mark.parametrize(("raw", "by_momentum"), [(TUG, True), (STEADY, False)], ids=["momentum", "rate"])
 def test_inputs_that_move_all_the_time_need_no_rates(raw, by_momentum, fmi):
     driver = ByExchange(raw, fmi)
@@ -92,7 +93,7 @@ def test_inputs_that_move_all_the_time_need_no_rates(raw, by_momentum, fmi):
     assert np.abs(found - truth(raw, by_momentum)).max() <= FLIGHT_ERROR
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 def test_momentum_is_a_state_where_every_change_keeps_it(fmi):
     names = [v.name for v in Instance(TUG, fmi).description.modelVariables if v.name.startswith("state.")]
     assert names[4:] == [f"state.angular_momentum[{i}]" for i in (1, 2, 3)]
@@ -104,7 +105,7 @@ def test_momentum_is_a_state_where_every_change_keeps_it(fmi):
 CHANGE_ERROR = 256 * EPS
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 def test_inputs_that_step_in_continuous_time_change_the_rate_at_once(fmi):
     driver = ByExchange(TUG, fmi)
     driver.rates(0.0, driver.states, drawn_in(DURATION))
@@ -149,7 +150,7 @@ def test_changes_between_two_steps_are_one_change():
         assert np.abs(driver.angular_velocity - omega).max() <= CHANGE_ERROR * np.abs(omega).max()
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 @pytest.mark.parametrize("raw", [TUG, MIXED], ids=["momentum", "rate"])
 def test_an_event_says_whether_it_changed_the_states(raw, fmi):
     driver = ByExchange(raw, fmi)
@@ -164,7 +165,7 @@ def test_an_event_says_whether_it_changed_the_states(raw, fmi):
         assert (driver.states.tolist() != before.tolist()) is changed
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 def test_a_mixture_refuses_moving_poses_in_continuous_time_and_keeps_its_state(fmi):
     driver = ByExchange(MIXED, fmi)
     states = driver.states.tolist()
@@ -181,7 +182,7 @@ def test_a_mixture_refuses_moving_poses_in_continuous_time_and_keeps_its_state(f
     assert np.isfinite(driver.rates(0.0, driver.states)).all()
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 def test_a_mixture_takes_moving_masses_in_continuous_time(fmi):
     driver = ByExchange(MIXED, fmi)
     driver.fly(DURATION, lambda t: {"tank.mass": 400.0 + 10.0 * t})
@@ -219,7 +220,7 @@ WITH_GRIP = variant(
 )
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 @pytest.mark.parametrize("kind", REFUSALS)
 def test_a_change_that_cannot_be_is_refused_by_name_and_leaves_the_state(kind, fmi):
     wrong, message = REFUSALS[kind]

@@ -22,9 +22,9 @@ from changes.histories import (
     start_values,
 )
 from supervessel import reference
-from support import EPS, scene
+from support import U, scene
+from support.marks import FMI
 
-U = EPS / 2
 BOOKS = 64 * U
 """Of the sum of the magnitudes of all terms: what rounding may leave open."""
 
@@ -80,7 +80,7 @@ def test_books_of_the_fmu_close(count, history):
 
 
 @pytest.mark.parametrize("driver", [ByFmu, ByExchange])
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 @pytest.mark.parametrize("kept", KEPT, ids=" ".join)
 @settings(deadline=None, derandomize=True, max_examples=5, phases=(Phase.explicit, Phase.generate))
 @given(history=HISTORIES)

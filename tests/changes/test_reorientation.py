@@ -4,13 +4,10 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from changes.histories import ByExchange, ByFmu, Values, elements
-from support import variant
-
-Array = NDArray[np.float64]
+from support import Array, variant
 
 BASE, ARM = 1000.0, 300.0  # kg
 BASE_PMI, ARM_PMI = np.array([2.0, 3.0, 4.0]), np.array([1.0, 1.5, 2.0])  # m2

@@ -18,9 +18,9 @@ from function_fmu import build_function_fmu
 
 from fmu_build.platforms import host_platform
 from support import DISCARD, ERROR, OK
+from support.marks import FMI
 
 STARTS = {"angles": [0.1, 0.2], "gain": 3.0}
-VERSIONS = pytest.mark.parametrize("fmi", [2, 3])
 
 
 def law() -> ca.Function:
@@ -86,7 +86,7 @@ def running(path: Path) -> Iterator[Law]:
     it.fmu.freeInstance()
 
 
-@VERSIONS
+@FMI
 def test_the_archive_is_valid_and_names_every_element(built, fmi):
     assert validate_fmu(str(built[fmi])) == []
     description = read_model_description(str(built[fmi]))
@@ -103,7 +103,7 @@ def test_the_archive_is_valid_and_names_every_element(built, fmi):
     assert host_platform().fmi2 in supported_platforms(str(built[fmi]))
 
 
-@VERSIONS
+@FMI
 def test_outputs_are_the_functions_to_the_last_bit(built, fmi):
     rng = np.random.default_rng(3)
     with running(built[fmi]) as it:
@@ -117,7 +117,7 @@ def test_outputs_are_the_functions_to_the_last_bit(built, fmi):
             np.testing.assert_array_equal(it.get([0, 6, 4]), [0.5 * k + 0.5, expected[2], expected[0]])
 
 
-@VERSIONS
+@FMI
 def test_values_that_cannot_be_used_are_discarded_and_change_nothing(built, fmi):
     with running(built[fmi]) as it:
         before = it.get([1, 2, 3, 4, 5, 6])
@@ -128,7 +128,7 @@ def test_values_that_cannot_be_used_are_discarded_and_change_nothing(built, fmi)
         assert it.get([0]) == [0.0]
 
 
-@VERSIONS
+@FMI
 def test_an_output_that_is_no_number_is_refused_with_its_name(built, fmi):
     with running(built[fmi]) as it:
         assert it.set([3], [-9.0]) == OK
@@ -137,7 +137,7 @@ def test_an_output_that_is_no_number_is_refused_with_its_name(built, fmi):
         assert "size leaves the range of finite numbers" in it.log[-1]
 
 
-@VERSIONS
+@FMI
 @pytest.mark.parametrize(
     ("call", "problem"),
     [
@@ -157,7 +157,7 @@ def test_wrong_calls_are_errors_that_say_what_is_wrong(built, fmi, call, problem
         assert it.set([1], [1.0]) == OK
 
 
-@VERSIONS
+@FMI
 def test_another_builds_token_is_refused(built, fmi):
     with pytest.raises(Exception, match="nstantiate"):
         Law(built[fmi], token="{another}")

@@ -12,6 +12,7 @@ import pytest
 from fmu_build import build_fmu
 from supervessel import Twin, load_scene
 from support.pages import text
+from support import U
 
 ROOT = Path(__file__).parents[2]
 sys.path += [str(ROOT / "examples"), str(ROOT / "tests" / "bench")]
@@ -19,7 +20,6 @@ sys.path += [str(ROOT / "examples"), str(ROOT / "tests" / "bench")]
 import nmpc  # noqa: E402
 import nmpc_slew as slew  # noqa: E402
 
-U = 2.0**-53
 OPERATIONS = 1e4
 """Of one stage's Hessian, at most: each adds a rounding."""
 TOLERANCE = 1e-8

@@ -11,10 +11,9 @@ import pytest
 
 from supervessel import Twin
 from support import DISCARD, EPS, ERROR, ISS_DG, OK, Instance, body, scene, variant
+from support.marks import FMI, KIND
 
 SEED = 20240609
-FMI = pytest.mark.parametrize("fmi", [2, 3])
-KIND = pytest.mark.parametrize("exchange", [False, True], ids=["co-simulation", "model exchange"])
 NAN, INF = float("nan"), float("inf")
 
 # Both sides evaluate the same formulas with some hundred roundings, none of which is amplified by more than

@@ -12,8 +12,8 @@ from fmpy.validation import validate_fmu
 from lxml import etree
 
 from support import ERROR, ISS_DG, OK, Instance, built, variant
+from support.marks import FMI
 
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 ISS, DG = 455000.0, 24500.0
 
 DOCKING = variant(

@@ -10,9 +10,9 @@ from fmpy import extract
 
 from supervessel import Twin
 from support import ISS_DG, body, built, relative_error, scene, variant
+from support.marks import FMI
 
 SEED = 20240614
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 
 # Both sides evaluate the same formulas with some hundred roundings, none of which is amplified by more than
 # ten within a row: 1e3 EPS, rounded up.

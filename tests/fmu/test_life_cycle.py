@@ -25,9 +25,9 @@ from support import (
     scene,
     variant,
 )
+from support.marks import FMI
 
 SEED = 20240612
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 
 # A quotient by the root of a sum of four squares is off by at most 2 EPS relative in each component; taking
 # the norm again rounds by up to EPS more.

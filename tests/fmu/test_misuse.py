@@ -34,8 +34,8 @@ from fmpy.fmi2 import (
 from fmpy.fmi3 import fmi3LogMessageCallback
 
 from support import DISCARD, ERROR, ISS_DG, OK, Instance, body, built
+from support.marks import FMI
 
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 RAW = ISS_DG
 NAN, INF = float("nan"), float("inf")
 LETTERS = {"O": OK, "D": DISCARD, "E": ERROR}

@@ -16,9 +16,9 @@ from lxml import etree
 
 from supervessel import reference
 from support import EPS, ISS_DG, OK, Instance, body, built, flying, scene, variant
+from support.marks import FMI
 
 SEED = 20240611
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 
 PARAMETERS = [
     *(f"angular_velocity_start[{i}]" for i in (1, 2, 3)),

@@ -25,9 +25,9 @@ from support import (
     scene,
     variant,
 )
+from support.marks import FMI
 
 SEED = 20240611
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 MODE = pytest.mark.parametrize("mode", ["event", "continuous"])
 NAN, INF = float("nan"), float("inf")
 

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from supervessel import SceneError, parse_scene, reference
@@ -19,26 +18,24 @@ from supervessel.equations import equations, p_start
 from supervessel.rotation.propagators import plan_of
 from support import (
     DISCARD,
-    EPS,
     ERROR,
     ISS_DG,
+    LAWS,
     OK,
+    PROPAGATORS,
+    Array,
     Instance,
+    U,
     body,
     flying,
     random_rotation,
     scene,
     variant,
 )
+from support.marks import FMI
 from support.series import Vector, flight, norm
 
-Array = NDArray[np.float64]
-
-FMI = pytest.mark.parametrize("fmi", [2, 3])
-U = EPS / 2
 NAN, INF = math.nan, math.inf
-PROPAGATORS = ("rk4", "dop853", "taylor", "exact", "split", "auto")
-LAWS = ("none", "decoupled", "principal", "tensor")
 FREE = ("exact", "auto")  # what free motion is exact for
 EVERY = pytest.mark.parametrize("propagator", PROPAGATORS)
 
@@ -538,7 +535,7 @@ def test_auto_steps_where_the_composite_has_just_changed_and_flies_free_again_af
 # A tolerance of the importer's.
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 def test_the_importers_tolerance_overrides_the_scenes(fmi):
     raw = tilted("dop853")
     errors = []
@@ -724,7 +721,7 @@ def test_the_estimate_is_zero_at_first_positive_after_a_step_and_part_of_a_state
         assert instance.get("error_estimate") == 0.0
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 def test_the_estimate_is_zero_in_model_exchange(fmi):
     instance = Instance(assembly("exact") if fmi == 3 else ASSEMBLY_2, fmi, exchange=True)
     assert instance.initialise() == OK

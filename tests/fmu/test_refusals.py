@@ -12,8 +12,8 @@ from fmpy.fmi2 import fmi2LastSuccessfulTime
 from fmpy.fmi3 import fmi3Boolean, fmi3Float64
 
 from support import DISCARD, EPS, ERROR, ISS_DG, OK, Instance, body, flying, relative_error, variant
+from support.marks import FMI
 
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 NAN, INF = math.nan, math.inf
 
 # The same numbers from directions that differ by a power of two or by what is projected out: about 20

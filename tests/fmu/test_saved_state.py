@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 
 from support import DISCARD, ERROR, ISS_DG, OK, Instance, body, draw_inputs, variant
+from support.marks import FMI, KIND
 
 SEED = 20240613
-FMI = pytest.mark.parametrize("fmi", [2, 3])
-KIND = pytest.mark.parametrize("exchange", [False, True], ids=["co-simulation", "model exchange"])
 ROTATION = {"angular_velocity": [0.05, -0.08, 0.11], "attitude": [0.5, -0.5, 0.7, 0.1]}
 RAW = variant(ISS_DG, {"name": "saved", "rotation": ROTATION})
 

@@ -9,10 +9,9 @@ from fmpy import simulate_fmu
 from scipy.integrate import solve_ivp
 
 from supervessel import reference
-from support import EPS, ISS_DG, relative_error, scene, unpacked, variant
+from support import EPS, ISS_DG, LAWS, relative_error, scene, unpacked, variant
+from support.marks import FMI
 
-FMI = pytest.mark.parametrize("fmi", [2, 3])
-LAWS = ("none", "decoupled", "principal", "tensor")
 LAW = pytest.mark.parametrize("law", LAWS)
 
 STOP, STEP = 60.0, 0.5  # s

@@ -6,16 +6,14 @@ from threading import Barrier, get_ident
 from typing import Any
 
 import numpy as np
-import pytest
 
 from support import DISCARD, ISS_DG, OK, Instance, variant
+from support.marks import FMI, KIND
 
 SEED = 20240615
 COUNT = 200
 LIVES = 8  # different flights among them
 STEPS = 6
-FMI = pytest.mark.parametrize("fmi", [2, 3])
-KIND = pytest.mark.parametrize("exchange", [False, True], ids=["co-simulation", "model exchange"])
 RAW = variant(ISS_DG, {"name": "threaded", "rotation": {"angular_velocity": [0.05, -0.08, 0.11]}})
 
 

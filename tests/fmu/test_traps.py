@@ -19,6 +19,7 @@ from fmpy import read_model_description
 from fmu_build.compile.compiler import fmi_headers
 from fmu_build.platforms import host_platform
 from support import ISS_DG, OK, Instance, body, store, unpacked, variant
+from support.marks import FMI
 from support.traps import FLAGS_KNOWN
 
 needs_glibc = pytest.mark.skipif(
@@ -27,7 +28,6 @@ needs_glibc = pytest.mark.skipif(
 needs_flags = pytest.mark.skipif(
     not FLAGS_KNOWN, reason="the bits of the floating-point flags are unknown here"
 )
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 PROPAGATORS = ("auto", "taylor", "dop853", "rk4", "exact")
 SPINS = {
     "rest": (0.0, 0.0, 0.0),

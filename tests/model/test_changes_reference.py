@@ -5,12 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from supervessel import reference
-from support import EPS, random_rotation, scene, variant
-
-Array = NDArray[np.float64]
+from support import EPS, Array, random_rotation, scene, variant
 
 # Two bodies on a common x axis, ports towards each other: the ship is turned half a turn about y.
 BASE, SHIP = 800.0, 200.0  # kg

@@ -9,12 +9,10 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from supervessel import Twin, reference
-from support import ISS_DG, flying, relative_error, scene, variant
+from support import ISS_DG, Array, flying, relative_error, scene, variant
 
-Array = NDArray[np.float64]
 Rows = Sequence[Sequence[Any]]
 
 ENGINES = ("reference", "twin", "fmi2", "fmi3")

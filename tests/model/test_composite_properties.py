@@ -13,26 +13,25 @@ import mpmath as mp
 import numpy as np
 import pytest
 from hypothesis import Phase, assume, given, settings
-from numpy.typing import NDArray
 
 from supervessel import Twin, reference
 from support import (
     DISCARD,
-    EPS,
     ISS_DG,
     OK,
+    Array,
     Instance,
+    U,
     flying,
     random_rotation,
     relative_error,
     scene,
     variant,
 )
+from support.marks import FMI
 
-Array = NDArray[np.float64]
 Whole = tuple[float, Array, Array]  # mass, barycentre, inertia
 
-U = EPS / 2
 # A failing example is not shrunk: with a scene to build for each trial that takes minutes.
 RUN = settings(deadline=None, derandomize=True, max_examples=30, phases=(Phase.explicit, Phase.generate))
 
@@ -480,7 +479,7 @@ def test_directions_in_a_scene_have_any_length(engine: str, lengths: tuple[float
     assert relative_error(inertia, by_reference(ISS_DG)[2]) <= LENGTH_ULPS * INERTIA_ULPS * U
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 @pytest.mark.parametrize("lengths", LENGTHS + MODERATE)
 def test_directions_as_inputs_have_any_length(lengths: tuple[float, float], fmi: int) -> None:
     with flying(ISS_DG, fmi) as fmu:

@@ -10,7 +10,6 @@ from functools import cache
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate._ivp import dop853_coefficients as scipy_dop853
 
 from supervessel.rotation.attitude import attitude_dot
@@ -18,12 +17,9 @@ from supervessel.rotation.laws import LAWS
 from supervessel.rotation.propagators import dop853
 from supervessel.rotation.propagators.dop853 import dop853_step
 from supervessel.rotation.propagators.taylor import taylor_order, taylor_step
-from support import EPS, random_rotation
+from support import Array, U, random_rotation
 from support.series import Number, Vector, flight, mp, norm
 
-Array = NDArray[np.float64]
-
-U = EPS / 2
 NUMBERS = {"none": 0, "decoupled": 3, "principal": 7, "tensor": 13}
 METHODS = ("dop853", "taylor")
 TILTED = np.array([[1.0, 0.06, -0.04], [0.06, 2.0, 0.05], [-0.04, 0.05, 2.5]])

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from supervessel.rotation.propagators import free_motion, theta
-from support import EPS, series
+from support import EPS, hamilton, series
 
 Number = Any  # mpf or mpc
 Triple = tuple[Number, Number, Number]
@@ -452,7 +452,7 @@ def turn_of(m: Motion, w: tuple[Number, ...], angle: Number) -> list[Number]:
     """Returns the turn in principal axes, [FM] eqs. (19), (20), with (4), (5) undone."""
     first, last = shortest(m, m.w), shortest(m, w)
     half = [mp.cos(angle / 2), mp.mpf(0), mp.mpf(0), mp.sin(angle / 2)]
-    q = series.times(series.times([first[0], *(-x for x in first[1:])], half), last)
+    q = hamilton(hamilton([first[0], *(-x for x in first[1:])], half), last)
     size = mp.sqrt(sum(x * x for x in q))
     return [q[0] / size, *(x / size for x in undone(m, q[1:]))]
 

@@ -14,7 +14,7 @@ from supervessel.shell.interrupts import uninterrupted
 from supervessel.shell.processes import Workers, run
 from support import ISS_DG, scene
 from support.processes import heard, needs_posix
-from support.signals import BALL, WATCHDOG, begin, needs_linux, programs, wait_for
+from support.signals import ANY_BALL, WATCHDOG, begin, needs_linux, programs, wait_for
 
 __all__ = ["heard"]
 
@@ -133,7 +133,7 @@ def test_a_program_that_builds_gets_the_keyboards_interrupt_and_no_compiler_is_l
     work, temporary = tmp_path / "work", tmp_path / "temporary"
     work.mkdir()
     temporary.mkdir()
-    (work / "ball.toml").write_text(BALL.format(mass=1.25))
+    (work / "ball.toml").write_text(ANY_BALL.format(mass=1.25))
     (work / "program.py").write_text(LIBRARY)
     running = begin(("program",), work, TMPDIR=temporary)
     wait_for(lambda: running.poll() is not None or any("zig" in name for name in programs(running.pid)))

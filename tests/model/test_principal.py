@@ -8,17 +8,13 @@ import mpmath as mp
 import numpy as np
 import pytest
 from hypothesis import Phase, assume, given, settings
-from numpy.typing import NDArray
 
 from supervessel import reference
 from supervessel.composite.inertia import from_upper_triangle, upper_triangle
 from supervessel.rotation import principal as module
 from supervessel.rotation.principal import TIE, principal, principal_forward, quaternion
-from support import EPS, random_rotation
+from support import EPS, Array, U, random_rotation
 
-Array = NDArray[np.float64]
-
-U = EPS / 2
 DENORMAL = 2.0**-1074
 DIGITS = 60
 RUN = settings(deadline=None, derandomize=True, max_examples=60, phases=(Phase.explicit, Phase.generate))

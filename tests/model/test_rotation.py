@@ -9,17 +9,13 @@ import hypothesis.strategies as st
 import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from supervessel import Twin, reference
-from support import EPS, ISS_DG, body, random_rotation, scene, variant
+from support import ISS_DG, LAWS, Array, U, body, hamilton, random_rotation, scene, variant
 
-Array = NDArray[np.float64]
 Flight = tuple[dict[str, Any], Any, Array]  # raw scene, torque, state after DURATION
 
-U = EPS / 2
-LAWS = ("none", "decoupled", "principal", "tensor")
 RATES = (0.3, 0.7, 0.5)  # rad/s
 ATTITUDE = (0.5, -0.1, 0.7, 0.3)
 TORQUE = (150.0, -300.0, 200.0)  # N m
@@ -59,12 +55,6 @@ def dop853(twin: Twin, torque: Any, duration: float) -> Array:
     return done.y[:, -1]
 
 
-def times(a: Any, b: Any) -> Array:
-    """Returns the Hamilton product of two quaternions."""
-    a, b = np.asarray(a), np.asarray(b)
-    return np.array([a[0] * b[0] - a[1:] @ b[1:], *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:]))])
-
-
 def turn(vector: Any) -> Array:
     """Returns the quaternion of a rotation by |vector| about it."""
     vector = np.asarray(vector, dtype=float)
@@ -75,14 +65,14 @@ def turn(vector: Any) -> Array:
 def constant_rate() -> Flight:
     raw = tilted(law="none", angular_velocity=list(RATES), attitude=list(ATTITUDE))
     start = scene(raw).rotation.attitude
-    return raw, TORQUE, np.array([*times(start, turn(DURATION * np.array(RATES))), *RATES])
+    return raw, TORQUE, np.array([*hamilton(start, turn(DURATION * np.array(RATES))), *RATES])
 
 
 def constant_torque() -> Flight:
     raw = tilted(law="decoupled", attitude=list(ATTITUDE))
     acceleration = 150.0 / TILTED[1, 1]
     turned = turn([0.0, acceleration * DURATION**2 / 2, 0.0])
-    state = [*times(scene(raw).rotation.attitude, turned), 0.0, acceleration * DURATION, 0.0]
+    state = [*hamilton(scene(raw).rotation.attitude, turned), 0.0, acceleration * DURATION, 0.0]
     return raw, (0.0, 150.0, 0.0), np.array(state)
 
 
@@ -93,7 +83,7 @@ def symmetric_top(law: str) -> Flight:
     start, omega = scene(raw).rotation.attitude, np.array(RATES)
     momentum = reference.rotation_matrix(start) @ (np.array([a, a, c]) * omega)
     spin = np.array([0.0, 0.0, (1 - c / a) * omega[2] * DURATION])
-    attitude = times(times(turn(momentum / a * DURATION), start), turn(spin))
+    attitude = hamilton(hamilton(turn(momentum / a * DURATION), start), turn(spin))
     phase = (1 - c / a) * omega[2] * DURATION
     x, y = (
         np.cos(phase) * omega[0] + np.sin(phase) * omega[1],
@@ -168,7 +158,7 @@ def test_constant_rate_turns_by_the_angle_of_the_runge_kutta_polynomial() -> Non
     h, count = 0.5, 1000
     t = np.linalg.norm(RATES) * h / 2
     half_angle = count * np.arctan2(t - t**3 / 6, 1 - t**2 / 2 + t**4 / 24)
-    expected = times(
+    expected = hamilton(
         scene(raw).rotation.attitude, turn(2 * half_angle * np.array(RATES) / np.linalg.norm(RATES))
     )
     end = flown(Twin(scene(raw)), torque, h, count)[:4, -1]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-Array = np.ndarray
+from support import Array
 
 
 def port_frame(port: Sequence[float]) -> tuple[Array, Array]:

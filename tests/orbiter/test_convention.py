@@ -10,6 +10,7 @@ from orbiter.points import scene_pmi
 from supervessel import SceneError, Twin, parse_scene, reference
 from support import ISS_DG, OK, flying, relative_error, scene, variant
 from support.pages import text
+from support.marks import FMI
 
 ROOT = Path(__file__).parents[2]
 
@@ -61,7 +62,7 @@ def test_the_twin_equals_the_sum_of_six_points_a_vessel(raw):
     assert np.count_nonzero(inertia - np.diag(np.diag(inertia))) == 0
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 def test_the_fmu_equals_the_sum_of_six_points_a_vessel_as_inputs_change(fmi):
     raw = SCENES["a wheel in Mir's place"]
     later = variant(raw, {"vessels.DG.mass": 11700.0, "vessels.DG.pmi": [1.0, 2.0, 9.0]})

@@ -15,9 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from engines import Array
 
-Array = NDArray[np.float64]
 Flight = Callable[[], Array]
 Settings = Iterator[tuple[str, Callable[[], Flight]]]
 

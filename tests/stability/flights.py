@@ -14,16 +14,11 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stability.truth import Case, attitude_error, rate_error
 from supervessel.equations import composite_at_start, composite_slices
-from support import DISCARD, OK, Instance, scene, variant
+from support import DISCARD, OK, Array, Instance, U, scene, variant
 
-Array = NDArray[np.float64]
-
-U = 2.0**-53
-PROPAGATORS = ("rk4", "dop853", "taylor", "exact", "split", "auto")
 TEMPLATE = [[3.0, 0.1, -0.2], [0.1, 4.0, 0.3], [-0.2, 0.3, 5.0]]
 """Any tensor none of whose elements is zero: what is constant is folded into the code."""
 

@@ -4,15 +4,12 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stability import truth
 from stability.flights import TEMPLATE, single
 from stability.truth import Case, Problem, mp
 from supervessel.equations import composite_at_start
-from support import scene, variant
-
-Array = NDArray[np.float64]
+from support import Array, scene, variant
 
 NEAR, FAR = [0.0, 0.0, 5.0], [1.5, -2.5, -3.0]
 """Ports [m]: the second vessel stands at NEAR - FAR and is not turned."""

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from stability import truth
-from stability.flights import Craft, End, U, craft, errors
+from stability.flights import Craft, End, craft, errors
 from stability.truth import Case
+from support import U
 
 ANGLE_STEP = 0.05  # rad, what a scene has by default
 

@@ -14,11 +14,11 @@ from fmpy import read_model_description
 from fmu_build.compile.compiler import fmi_headers
 from fmu_build.platforms import host_platform
 from stability import truth
-from stability.flights import TEMPLATE, Craft, U, craft, one_tensor, single
+from stability.flights import TEMPLATE, Craft, craft, one_tensor, single
 from stability.pair import MASSES, pair, pair_case, pair_inertia, pair_truth
 from stability.runs import RUNS, Run, applies, flights, is_long, motion_problem, problem
 from supervessel import Twin
-from support import DISCARD, OK, scene, store, unpacked, variant
+from support import DISCARD, OK, U, scene, store, unpacked, variant
 
 FREE = [name for name in truth.categories() if not name.startswith("torque")]
 DIAGONAL = [name for name in FREE if not name.endswith("full tensor")]

@@ -27,10 +27,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from support.numbers import hamilton as _hamilton
 from support.series import Matrix, Number, Vector, mp, taylor
 from support.series import apply as _apply
 from support.series import norm as _norm
-from support.series import times as _times
 
 FILE = Path(__file__).with_name("truth.json")
 DIGITS = 34  # kept of each result
@@ -177,7 +177,7 @@ def _about(axis: int, angle: Number) -> Vector:
 
 def _angle(a: Vector, b: Vector) -> Number:
     """Returns the angle from one attitude to another, 0 to 2 pi [rad]."""
-    d = _times(_conjugate(a), b)
+    d = _hamilton(_conjugate(a), b)
     return 2 * mp.atan2(_norm(d[1:]), d[0])
 
 
@@ -185,8 +185,8 @@ def _power(q: Vector, count: int) -> Vector:
     result = [mp.one, mp.zero, mp.zero, mp.zero]
     while count:
         if count & 1:
-            result = _times(result, q)
-        q, count = _times(q, q), count >> 1
+            result = _hamilton(result, q)
+        q, count = _hamilton(q, q), count >> 1
     return result
 
 
@@ -275,7 +275,7 @@ class _Circulation:
         lead = mp.atan2(y * cn - x * sn, x * cn + y * sn)
         spin = mp.pi / 2 - self.s * (amplitude + lead)
         nutation = mp.atan2(_norm([x, y]), J2 * w[2])
-        return phi, _times(_about(0, nutation), _about(2, spin)), w
+        return phi, _hamilton(_about(0, nutation), _about(2, spin)), w
 
 
 def _circulation(inertia: Matrix, omega: Vector) -> tuple[_Circulation, Matrix] | None:
@@ -303,7 +303,7 @@ def free(inertia: Matrix, omega: Vector, time: Number) -> tuple[Vector, Vector]:
         return [mp.cos(half), *(x / size * mp.sin(half) if size else mp.zero for x in omega)], omega
     circulation, axes = motion
     (start, q_start, _), (end, q_end, w) = circulation.state(mp.zero), circulation.state(time)
-    turn = _times(_conjugate(q_start), _times(_about(2, end - start), q_end))
+    turn = _hamilton(_conjugate(q_start), _hamilton(_about(2, end - start), q_end))
     return [turn[0], *_apply(axes, turn[1:])], _apply(axes, w)
 
 
@@ -380,7 +380,7 @@ def by_periods(inputs: Inputs, longest: float, digits: int = 60) -> tuple[Vector
         once, back = taylor(inertia, omega, torque, period, digits)
         if _norm([a - b for a, b in zip(back, omega, strict=True)]) > AGREEMENT * _norm(omega):
             raise ArithmeticError("the rate is not back after a period")
-        turn = _times(_power(once, count), turn)
+        turn = _hamilton(_power(once, count), turn)
     return turn, w
 
 
@@ -407,7 +407,7 @@ def _solved(category: str, problem: Problem) -> tuple[dict[str, Any], str]:
     moved = [differences((turn, w), solve(changed, 45)) for changed in _perturbed(inputs)]
     terms = [[float(pair[i] / PERTURBATION) for pair in moved] for i in range(2)]
     moments = 6 - sum(x == 0 for i in range(3) for x in inertia[i][i:])  # of the terms, the first
-    end = _times(_unit([mp.mpf(x) for x in problem.attitude]), _unit(turn))
+    end = _hamilton(_unit([mp.mpf(x) for x in problem.attitude]), _unit(turn))
     return {
         "name": problem.name,
         "category": category,

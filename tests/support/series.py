@@ -13,6 +13,8 @@ from typing import Any
 
 import mpmath
 
+from support.numbers import hamilton
+
 mp = mpmath.MPContext()
 mp.dps = 120
 Number = Any  # mpf of this context
@@ -26,15 +28,6 @@ def norm(v: Sequence[Number]) -> Number:
 
 def apply(matrix: Matrix, v: Vector) -> Vector:
     return [sum(map(mul, row, v)) for row in matrix]
-
-
-def times(a: Vector, b: Vector) -> Vector:
-    return [
-        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-        a[0] * b[2] + a[2] * b[0] + a[3] * b[1] - a[1] * b[3],
-        a[0] * b[3] + a[3] * b[0] + a[1] * b[2] - a[2] * b[1],
-    ]
 
 
 def flight(law: str, inertia: Any, state: Any, torque: Any, time: Any, *, digits: int = 25) -> Vector:
@@ -54,7 +47,7 @@ def flight(law: str, inertia: Any, state: Any, torque: Any, time: Any, *, digits
         M = [mp.zero if law == "none" else M[i] / J[i][i] for i in range(3)]
         J = [[mp.mpf(i == j) for j in range(3)] for i in range(3)]
     turn, rate = taylor(J, w, M, mp.mpf(time), digits)
-    return [*times(q, turn), *rate]
+    return [*hamilton(q, turn), *rate]
 
 
 def _conv(a: list[int], b: list[int]) -> int:

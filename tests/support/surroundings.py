@@ -14,7 +14,8 @@ import pytest
 
 from orbiter.files import Files
 from support.processes import ROOT, begin_cache, kept_in
-from support.signals import ACCURACY, BALL, EXPERIMENT, IMPORT
+from support.scenes import ACCURACY_ASKED, BALL, EXPERIMENT
+from support.signals import IMPORT
 
 WATCHDOG = 300.0
 """Seconds after which a command counts as one that never ends."""
@@ -86,9 +87,9 @@ def place_in(folder: Path, *, linked: bool = True) -> Place:
     for new in (place.work, place.temporary, place.cache):
         new.mkdir()
     Files(place.work)
-    texts = {"ball": (BALL,), "choice": (BALL, ACCURACY), "trade": (BALL, EXPERIMENT)}
+    texts = {"ball": (BALL,), "choice": (BALL, ACCURACY_ASKED), "trade": (BALL, EXPERIMENT)}
     for name, parts in texts.items():
-        (place.work / f"{name}.toml").write_text("".join(parts).format(mass=2.0))
+        (place.work / f"{name}.toml").write_text("".join(parts))
     if linked:
         begin_cache(place.cache)
     return place

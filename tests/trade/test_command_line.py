@@ -9,20 +9,10 @@ import pytest
 from fmu_build.trade import table
 from support import processes
 from support.processes import kept_in, needs_posix, run
+from support.scenes import BALL, EXPERIMENT
 from support.signals import KEPT
 
-SCENE = """\
-name = "ball"
-root = "B"
-[vessels.B]
-mass = 2.0
-pmi = [1.0, 1.5, 2.0]
-[rotation]
-angular_velocity = [0.01, 0.02, 0.03]
-[experiment]
-duration = 10.0
-step = 1.0
-"""
+SCENE = BALL + EXPERIMENT
 
 FILES = ["trade.json", "trade.md", "trade.png", "trade.svg"]
 

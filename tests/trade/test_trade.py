@@ -13,11 +13,9 @@ from fmu_build.flight.experiment import course_of
 from fmu_build.flight.flying import fly_all
 from fmu_build.trade import TradeError, plot, study, table
 from supervessel import parse_scene, reference
-from support import variant
+from support import U, variant
 from support.processes import kept_in
 from support.series import flight, mp, norm
-
-U = 2.0**-53
 
 BODY: dict[str, Any] = {
     "name": "traded",

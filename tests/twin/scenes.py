@@ -4,14 +4,9 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from supervessel import Twin
-from support import ISS_DG
-
-Array = NDArray[np.float64]
-
-LAWS = ("none", "decoupled", "principal", "tensor")
+from support import ISS_DG, LAWS, Array
 
 
 def random_pmi(rng: np.random.Generator) -> list[float]:

@@ -9,7 +9,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from changes.test_docking import MIR
 from fmu_build import BuildError
@@ -17,10 +16,8 @@ from fmu_build.generate.model import generate
 from fmu_build.generate.sources import LAYER
 from supervessel import Twin
 from supervessel.twin.functions import TwinFunction
-from support import EPS, ISS_DG, OK, Instance, body, scene, variant
+from support import EPS, ISS_DG, OK, Array, Instance, body, scene, variant
 from twin.scenes import numbers, random_inputs, random_scene
-
-Array = NDArray[np.float64]
 
 STARTS = 12  # of flights of each scene
 ANGLES = [0.01, 3.0, 40.0]  # rad, about what the body turns by in a communication step

@@ -7,16 +7,12 @@ import casadi as ca
 import mpmath as mp
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.linalg import expm, solve_continuous_are
 from scipy.spatial.transform import Rotation
 
 from supervessel import Twin
-from support import EPS, ISS_DG, body, scene, variant
+from support import ISS_DG, Array, U, body, scene, variant
 
-Array = NDArray[np.float64]
-
-U = EPS / 2
 FORMS = ("vec", "rotvec", "mrp")
 FORM = pytest.mark.parametrize("form", FORMS)
 DIGITS = 60

@@ -12,17 +12,15 @@ import pytest
 from numpy.typing import NDArray
 
 from supervessel import Scene, Twin, reference
-from support import EPS, ISS_DG, OK, body, flying, scene, variant
-from twin.scenes import LAWS, numbers, random_inputs, random_scene
-
-Array = NDArray[np.float64]
+from support import ISS_DG, LAWS, OK, Array, U, body, flying, scene, variant
+from support.marks import FMI
+from twin.scenes import numbers, random_inputs, random_scene
 
 SEEDS = range(12)
 STATES = tuple(
     f"state.{n}[{i}]" for n, k in (("attitude", 4), ("angular_velocity", 3)) for i in range(1, k + 1)
 )
 STEPS = 8  # communication steps of a flight, each with new inputs
-U = EPS / 2
 
 # Twin and reference reach J by different sums of the same terms. A pose is a product of up to 5 rotations (at
 # most 4 docks, and the vessel's own), each of 3-term dot products of triads that are normalised cross
@@ -101,7 +99,7 @@ def rk4(ode: Any, x: NDArray[Any], h: Any) -> NDArray[Any]:
 # Names and signatures
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI
 def test_p_and_u_names_are_the_inputs_in_the_order_of_the_model_description(fmi: int) -> None:
     twin = twin_of(1)
     with flying(random_scene(1), fmi) as fmu:

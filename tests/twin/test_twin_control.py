@@ -11,17 +11,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from fmu_build.errors import BuildError
 from supervessel import Twin, reference
 from supervessel.twin.twin import FUNCTIONS
-from support import EPS, ISS_DG, body, relative_error, scene, variant
-
-Array = NDArray[np.float64]
+from support import ISS_DG, Array, U, body, relative_error, scene, variant
 
 ROOT = Path(__file__).parents[2]
-U = EPS / 2
 H = 0.5
 STEPS = 20
 RATES = {"angular_velocity": [0.05, -0.08, 0.11], "attitude": [0.5, -0.5, 0.7, 0.1]}

@@ -7,16 +7,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from supervessel import Twin
 from supervessel.rotation.propagators.free_motion import FIRST_ANGLE, LARGEST_TURN
-from support import EPS, ISS_DG, OK, body, flying, random_rotation, scene, variant
+from support import ISS_DG, OK, PROPAGATORS, Array, U, body, flying, random_rotation, scene, variant
 
-Array = NDArray[np.float64]
-
-U = EPS / 2
-PROPAGATORS = ("rk4", "dop853", "taylor", "exact", "split", "auto")
 RATES = [0.05, -0.08, 0.11]
 OUTPUTS = [*ISS_DG["outputs"]["names"], "principal_moments", "principal_axes", "error_estimate"]
 TORQUE, WEAK_TORQUE = [2e5, -1e5, 3e5], [2e-3, -1e-3, 3e-3]
