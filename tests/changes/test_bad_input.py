@@ -10,10 +10,8 @@ import pytest
 from changes.histories import Values, elements
 from changes.test_exchange import TUG
 from fmu.test_saved_state import bytes_of, restore
-from support import DISCARD, EPS, OK, Instance, variant
+from support import DISCARD, EPS, INF, NAN, OK, Instance, variant
 from support.marks import FMI
-
-NAN, INF = float("nan"), float("inf")
 
 # With a second vessel on the tank, and places at which docks cannot be closed.
 YARD = variant(

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from supervessel import Twin
-from support import DISCARD, EPS, ERROR, ISS_DG, OK, Instance, body, scene, variant
+from support import DISCARD, EPS, ERROR, INF, ISS_DG, NAN, OK, Instance, body, scene, variant
 from support.marks import FMI, KIND
 
 SEED = 20240609
-NAN, INF = float("nan"), float("inf")
 
 # Both sides evaluate the same formulas with some hundred roundings, none of which is amplified by more than
 # ten within a row: 1e3 EPS, rounded up.

@@ -11,9 +11,7 @@ import numpy as np
 import pytest
 from fmpy.fmi3 import fmi3IntermediateUpdateCallback, fmi3LogMessageCallback
 
-from support import DISCARD, EPS, ERROR, ISS_DG, OK, Instance, body, variant
-
-NAN, INF = float("nan"), float("inf")
+from support import DISCARD, EPS, ERROR, INF, ISS_DG, NAN, OK, Instance, body, variant
 
 # Quarters of a radian and of a second: times and sub-steps are exact in binary.
 STEADY = body(law="none", max_angle_step=0.25, angular_velocity=[0.0, 0.0, 1.0])

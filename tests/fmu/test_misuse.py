@@ -33,11 +33,10 @@ from fmpy.fmi2 import (
 )
 from fmpy.fmi3 import fmi3LogMessageCallback
 
-from support import DISCARD, ERROR, ISS_DG, OK, Instance, body, built
+from support import DISCARD, ERROR, INF, ISS_DG, NAN, OK, Instance, body, built
 from support.marks import FMI
 
 RAW = ISS_DG
-NAN, INF = float("nan"), float("inf")
 LETTERS = {"O": OK, "D": DISCARD, "E": ERROR}
 
 # Interface (co-simulation, model exchange) and where in its life an instance is.

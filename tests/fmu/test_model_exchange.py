@@ -16,7 +16,9 @@ from support import (
     DISCARD,
     EPS,
     ERROR,
+    INF,
     ISS_DG,
+    NAN,
     OK,
     Instance,
     built,
@@ -29,7 +31,6 @@ from support.marks import FMI
 
 SEED = 20240611
 MODE = pytest.mark.parametrize("mode", ["event", "continuous"])
-NAN, INF = float("nan"), float("inf")
 
 RATES, ATTITUDE = [0.05, -0.08, 0.11], [0.5, -0.5, 0.7, 0.1]
 RAW = variant(ISS_DG, {"name": "exchanged", "rotation": {"angular_velocity": RATES, "attitude": ATTITUDE}})

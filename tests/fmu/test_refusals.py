@@ -1,6 +1,5 @@
 """Values that cannot be used: stored as set, refused at first use, and without a trace once corrected."""
 
-import math
 from collections.abc import Callable, Mapping
 from ctypes import c_double
 from itertools import permutations
@@ -11,10 +10,8 @@ import pytest
 from fmpy.fmi2 import fmi2LastSuccessfulTime
 from fmpy.fmi3 import fmi3Boolean, fmi3Float64
 
-from support import DISCARD, EPS, ERROR, ISS_DG, OK, Instance, body, flying, relative_error, variant
+from support import DISCARD, EPS, ERROR, INF, ISS_DG, NAN, OK, Instance, body, flying, relative_error, variant
 from support.marks import FMI
-
-NAN, INF = math.nan, math.inf
 
 # The same numbers from directions that differ by a power of two or by what is projected out: about 20
 # roundings on the way to a port's axes, twice in each element of a tensor.

@@ -1,5 +1,6 @@
 """What tests compute with: arrays, the rounding of doubles, rotations."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -7,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+NAN, INF = math.nan, math.inf
 
 EPS = 2.0**-52
 """The distance from 1 to the next double."""
