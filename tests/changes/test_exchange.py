@@ -66,7 +66,7 @@ def drawn_in(time: float) -> Values:
     return pose | TORQUE | {"tank.mass": 400.0 + 200.0 * share**2}
 
 
-def truth(raw: dict[str, Any], by_momentum: bool) -> np.ndarray:
+def by_scipy(raw: dict[str, Any], by_momentum: bool) -> np.ndarray:
     """Returns attitude and angular velocity after DURATION by SciPy on the reference, (7,)."""
     flown = scene(raw)
     start, omega = np.array(flown.rotation.attitude), np.array(flown.rotation.angular_velocity)
@@ -90,7 +90,7 @@ def test_inputs_that_move_all_the_time_need_no_rates(raw, by_momentum, fmi):
     driver = ByExchange(raw, fmi)
     driver.fly(DURATION, drawn_in)
     found = np.concatenate([driver.attitude, driver.angular_velocity])
-    assert np.abs(found - truth(raw, by_momentum)).max() <= FLIGHT_ERROR
+    assert np.abs(found - by_scipy(raw, by_momentum)).max() <= FLIGHT_ERROR
 
 
 @FMI

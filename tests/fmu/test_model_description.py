@@ -1,10 +1,8 @@
 """modelDescription.xml of built FMUs: against the standard's schema, the scene and the FMU's behaviour."""
 
 import math
-import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from ctypes import c_double
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,23 +12,22 @@ import pytest
 from fmpy.validation import validate_fmu
 from lxml import etree
 
+from fmu.descriptions import (
+    CHAIN,
+    NINE,
+    PARAMETERS,
+    RATES,
+    SCENE,
+    STATES,
+    input_names,
+    output_names,
+    start_of,
+    variables,
+    xml,
+)
 from supervessel import reference
-from support import EPS, ISS_DG, OK, Instance, body, built, flying, scene, variant
+from support import EPS, ISS_DG, Instance, built, flying, scene
 from support.marks import FMI
-
-SEED = 20240611
-
-PARAMETERS = [
-    *(f"angular_velocity_start[{i}]" for i in (1, 2, 3)),
-    *(f"attitude_start[{i}]" for i in (1, 2, 3, 4)),
-]
-STATES = [
-    *(f"state.attitude[{i}]" for i in (1, 2, 3, 4)),
-    *(f"state.angular_velocity[{i}]" for i in (1, 2, 3)),
-]
-RATES = [f"der({state})" for state in STATES]
-SIZES = {"mass": 0, "kinetic_energy": 0, "attitude": 4}  # elements of an output; 3 if not listed
-NINE = [f"inertia[{i},{j}]" for i in (1, 2, 3) for j in (1, 2, 3)]
 
 # SI exponents, from the definitions N = kg m/s2 and J = N m.
 UNITS = {
@@ -67,91 +64,6 @@ UNIT_OF = {
 UNIT_OF_RATE = {None: "1/s", "rad/s": "rad/s2"}
 DISPLAY = {"rad/s": "deg/s", "rad/s2": "deg/s2"}
 
-# Elements of the model structure by what stands in them, in FMI 2.0 and FMI 3.0.
-PARTS = {
-    "outputs": ("Outputs", "Output"),
-    "derivatives": ("Derivatives", "ContinuousStateDerivative"),
-    "initial unknowns": ("InitialUnknowns", "InitialUnknown"),
-}
-PART = pytest.mark.parametrize("part", PARTS)
-
-# Three vessels in a row, ports at odd angles: the root's tensor is full and its mass an input, the middle one
-# has all its figures as inputs, both docks can be moved, one of them by the root's own port.
-CHAIN: dict[str, Any] = {
-    "name": "chain",
-    "root": "A",
-    "vessels": {
-        "A": {
-            "mass": 900.0,
-            "inertia": [[800.0, 50.0, -30.0], [50.0, 900.0, 40.0], [-30.0, 40.0, 700.0]],
-            "centre_of_mass": [0.1, -0.2, 0.3],
-            "ports": {"fore": {"position": [1.0, 2.0, 3.0], "direction": [3, 0, 4], "alignment": [-4, 5, 3]}},
-        },
-        "B": {
-            "mass": 500.0,
-            "pmi": [1.0, 1.3, 1.6],
-            "ports": {
-                "aft": {"position": [-2.0, 0.3, 0.1], "direction": [-1, 1, 0], "alignment": [1, 1, 1]},
-                "fore": {"position": [2.0, 0.1, 0.2], "direction": [1, 2, 0], "alignment": [-2, 1, 1]},
-            },
-        },
-        "C": {
-            "mass": 70.0,
-            "pmi": [0.4, 0.5, 0.6],
-            "ports": {"aft": {"position": [-1.0, 0.2, 0.4], "direction": [-2, 1, 0], "alignment": [0, 0, 3]}},
-        },
-    },
-    "docks": [{"ports": ["B.aft", "A.fore"]}, {"ports": ["B.fore", "C.aft"]}],
-    "inputs": {
-        "mass": ["B", "A"],
-        "pmi": ["B"],
-        "pose": ["C.aft", "A.fore"],
-        "range": {"B.mass": [0.0, 500.0], "B.pmi": [0.5, 2.0], "C.aft.position[2]": [-0.5, 0.5]},
-    },
-    "rotation": {
-        "law": "principal",
-        "angular_velocity": [0.01, -0.02, 0.03],
-        "attitude": [2.0, 0.0, 0.0, -2.0],
-    },
-    "experiment": {"duration": 60.0, "step": 0.25},
-    "outputs": {"names": ["attitude", "inertia", "mass", "pmi", "angular_momentum", "kinetic_energy"]},
-}
-SINGLE = variant(
-    body(1000.0, (1.0, 2.0, 2.5), law="none"), {"inputs": {"mass": ["B"], "pmi": ["B"], "torque": True}}
-)
-# A port adapter without mass: its moments are an input that nothing follows from.
-ADAPTER = variant(
-    ISS_DG,
-    {"name": "adapter", "vessels.DG.mass": 0.0, "inputs": {"pmi": ["DG"], "pose": ["DG.nose", "ISS.P2"]}},
-)
-SCENES = {
-    "everything": ISS_DG,
-    "chain": CHAIN,
-    "single": SINGLE,
-    "adapter": ADAPTER,
-    "no inputs": variant(body(law="decoupled"), {"name": "plain", "inputs": None, "outputs": None}),
-}
-SCENE = pytest.mark.parametrize("raw", SCENES.values(), ids=SCENES.keys())
-
-
-@cache
-def _xml(path: Path) -> etree._Element:
-    with zipfile.ZipFile(path) as archive:
-        return etree.fromstring(archive.read("modelDescription.xml"))
-
-
-def xml(raw: Mapping[str, Any], fmi: int) -> etree._Element:
-    """Returns the root element of a scene's model description."""
-    return _xml(built(raw, fmi))
-
-
-def variables(raw: Mapping[str, Any], fmi: int) -> dict[str, dict[str, str]]:
-    """Returns the attributes of each variable by name, laid out alike for both versions, in order."""
-    elements = xml(raw, fmi).find("ModelVariables")
-    if fmi == 3:
-        return {e.get("name"): dict(e.attrib) for e in elements}
-    return {e.get("name"): {**e.attrib, **e[0].attrib} for e in elements}
-
 
 def described(raw: Mapping[str, Any], fmi: int) -> dict[str, dict[str, str]]:
     """Returns the attributes of each variable that both versions have, states being named, not counted."""
@@ -169,77 +81,6 @@ def state_of(raw: Mapping[str, Any], fmi: int, number: str) -> str:
         return list(variables(raw, fmi))[int(number) - 1]
     [name] = [name for name, v in variables(raw, fmi).items() if v["valueReference"] == number]
     return name
-
-
-def groups(raw: Mapping[str, Any]) -> Iterator[tuple[str, int]]:
-    """Yields the scene's inputs as name without index and number of elements, 0 for a scalar."""
-    inputs = raw.get("inputs", {})
-    yield from ((f"{vessel}.mass", 0) for vessel in inputs.get("mass", []))
-    yield from ((f"{vessel}.pmi", 3) for vessel in inputs.get("pmi", []))
-    for port in inputs.get("pose", []):
-        yield from ((f"{port}.{part}", 3) for part in ("position", "direction", "alignment"))
-    if inputs.get("torque"):
-        yield "torque", 3
-
-
-def scalars(name: str, size: int) -> list[str]:
-    return [f"{name}[{i}]" for i in range(1, size + 1)] if size else [name]
-
-
-def input_names(raw: Mapping[str, Any]) -> list[str]:
-    return [scalar for name, size in groups(raw) for scalar in scalars(name, size)]
-
-
-def output_names(raw: Mapping[str, Any]) -> list[str]:
-    default = ["mass", "barycentre", "pmi", "angular_velocity", "attitude"]
-    names = raw.get("outputs", {}).get("names", default)
-    return [s for name in names for s in (NINE if name == "inertia" else scalars(name, SIZES.get(name, 3)))]
-
-
-def start_of(raw: Mapping[str, Any], name: str) -> float:
-    """Returns what the raw scene says of an input."""
-    group, _, index = name.rstrip("]").partition("[")
-    if group == "torque":
-        return 0.0
-    vessel, *port, key = group.split(".")
-    table = raw["vessels"][vessel]
-    value = (table["ports"][port[0]] if port else table)[key]
-    return float(value[int(index) - 1] if index else value)
-
-
-def structure(raw: Mapping[str, Any], fmi: int, part: str) -> dict[str, etree._Element]:
-    """Returns the elements of a part of the model structure by the variable that they stand for, in order."""
-    names = list(variables(raw, fmi))
-    root, tag = xml(raw, fmi).find("ModelStructure"), PARTS[part][fmi - 2]
-    elements = root.findall(tag) if fmi == 3 else list(root.find(tag))
-    if fmi == 2:
-        return {names[int(e.get("index")) - 1]: e for e in elements}
-    by_reference = {v["valueReference"]: name for name, v in variables(raw, fmi).items()}
-    return {by_reference[e.get("valueReference")]: e for e in elements}
-
-
-def kinds(raw: Mapping[str, Any], fmi: int, part: str) -> dict[str, dict[str, str]]:
-    """Returns by unknown the names of the variables that it is declared to depend on, with the kind."""
-    names = list(variables(raw, fmi))
-    by_reference = {v["valueReference"]: name for name, v in variables(raw, fmi).items()}
-    found = {}
-    for unknown, element in structure(raw, fmi, part).items():
-        numbers = element.attrib["dependencies"].split()
-        knowns = [names[int(n) - 1] if fmi == 2 else by_reference[n] for n in numbers]
-        assert len(set(knowns)) == len(knowns), unknown
-        found[unknown] = dict(zip(knowns, element.attrib["dependenciesKind"].split(), strict=True))
-    return found
-
-
-def dependencies(raw: Mapping[str, Any], fmi: int, part: str) -> dict[str, set[str]]:
-    """Returns by unknown the names of the variables that it is declared to depend on."""
-    return {unknown: set(line) for unknown, line in kinds(raw, fmi, part).items()}
-
-
-def unknowns(raw: Mapping[str, Any], part: str) -> list[str]:
-    """Returns what stands in a part of the model structure."""
-    outputs = output_names(raw)
-    return {"outputs": outputs, "derivatives": RATES, "initial unknowns": [*outputs, *STATES, *RATES]}[part]
 
 
 def strict_schema(fmi: int, folder: Path) -> etree.XMLSchema:
@@ -382,7 +223,7 @@ def test_nominals_are_magnitudes_of_the_scene(raw, fmi):
     whole = reference.composite(flown)
     rate = float(np.linalg.norm(flown.rotation.angular_velocity)) or 1.0
     moment = float(np.trace(whole.inertia)) / 3.0
-    truth = {
+    magnitudes = {
         "mass": whole.mass,
         "pmi": moment / whole.mass,
         "inertia": moment,
@@ -392,7 +233,7 @@ def test_nominals_are_magnitudes_of_the_scene(raw, fmi):
         "angular_momentum": moment * rate,
     }
     for name in (*output_names(raw), *STATES):
-        expected = truth.get(name.partition("[")[0], 1.0)
+        expected = magnitudes.get(name.partition("[")[0], 1.0)
         assert found[name] == pytest.approx(expected, rel=HALF_A_DIGIT), name
         assert found[name] == float(f"{found[name]:.3g}"), name
     assert all(math.isfinite(nominal) and nominal > 0.0 for nominal in found.values())
@@ -557,133 +398,3 @@ def test_nothing_has_an_event_indicator(raw, fmi):
 @SCENE
 def test_both_versions_describe_the_same_variables(raw):
     assert described(raw, 2) == described(raw, 3)
-
-
-@PART
-@SCENE
-def test_both_versions_declare_the_same_dependencies(raw, part):
-    assert kinds(raw, 2, part) == kinds(raw, 3, part)
-
-
-@PART
-@FMI
-@SCENE
-def test_every_unknown_stands_in_the_model_structure_in_order(raw, fmi, part):
-    assert list(dependencies(raw, fmi, part)) == unknowns(raw, part)
-
-
-@FMI
-@SCENE
-def test_the_model_structure_holds_nothing_else(raw, fmi):
-    root = xml(raw, fmi).find("ModelStructure")
-    assert {element.tag for element in root} == {tags[fmi - 2] for tags in PARTS.values()}
-
-
-@PART
-@FMI
-@SCENE
-def test_each_dependency_is_declared_constant_or_dependent(raw, fmi, part):
-    for unknown, line in kinds(raw, fmi, part).items():
-        assert set(line.values()) <= {"constant", "dependent"}, unknown
-
-
-@FMI
-@SCENE
-def test_an_angular_velocity_is_at_the_start_its_parameter(raw, fmi):
-    found = kinds(raw, fmi, "initial unknowns")
-    for i in (1, 2, 3):
-        assert found[f"state.angular_velocity[{i}]"] == {f"angular_velocity_start[{i}]": "constant"}
-    for i in (1, 2, 3, 4):
-        assert found[f"state.attitude[{i}]"] == {f"attitude_start[{k}]": "dependent" for k in (1, 2, 3, 4)}
-
-
-def random_point(raw: Mapping[str, Any], generator: np.random.Generator) -> dict[str, float]:
-    """Returns values for every input and start parameter in general position, all of them usable."""
-    point: dict[str, float] = {}
-    for name, size in groups(raw):
-        start = np.array([start_of(raw, scalar) for scalar in scalars(name, size)])
-        if name.endswith(("direction", "alignment", "position")) or name == "torque":
-            numbers = start + generator.uniform(-0.3, 0.3, size)
-        elif name.endswith("pmi"):
-            numbers = start.mean() * generator.uniform(0.8, 1.2, size)  # 0.8 + 0.8 > 1.2: a rigid body
-        else:
-            numbers = start * generator.uniform(0.5, 1.5)
-        point |= dict(zip(scalars(name, size), numbers, strict=True))
-    return point | dict(zip(PARAMETERS, generator.normal(size=7), strict=True))
-
-
-def observed(
-    raw: Mapping[str, Any], fmi: int, names: Sequence[str], running: str | None
-) -> dict[str, set[str]]:
-    """Returns by variable with which it changes, in the last bit at least, at any of some points.
-
-    The inputs have changed before: what a change of one makes may depend on that of another.
-
-    running : "exchange", "steps", or None while initialising; knowns are the inputs, with the states in model
-        exchange and the parameters before the start
-    """
-    generator = np.random.default_rng(SEED)
-    found: dict[str, set[str]] = {name: set() for name in names}
-    for _ in range(4):
-        point = random_point(raw, generator)
-        instance = Instance(raw, fmi, exchange=running == "exchange")
-        assert instance.enter() == OK
-        assert instance.set(point) == OK
-        if running:
-            assert instance.exit() == OK
-            moved = random_point(raw, generator)
-            point = {name: moved[name] for name in input_names(raw)}
-        if running == "steps":
-            assert instance.step(0.5) == OK
-        if running:
-            assert instance.set(point) == OK
-        if running == "exchange":  # still in event mode
-            point |= {state: instance.get(state) for state in STATES}
-        references = [instance.references[name] for name in names]
-        read = instance.fmu.getFloat64 if fmi == 3 else instance.fmu.getReal
-        for name in point:
-            before = read(references)
-            assert instance.set({name: point[name] * (1 + 0.01 * generator.uniform(0.5, 1.0))}) == OK
-            after = read(references)
-            assert instance.set({name: point[name]}) == OK
-            for unknown, old, new in zip(names, before, after, strict=True):
-                if old != new:
-                    found[unknown].add(name)
-        instance.free()
-    return found
-
-
-def without_kept(found: Mapping[str, set[str]]) -> dict[str, set[str]]:
-    """Returns dependencies without those of the angular momentum on poses: only rounding shows."""
-    poses = tuple(f".{part}[{i}]" for part in ("position", "direction", "alignment") for i in (1, 2, 3))
-    return {
-        unknown: {
-            name for name in names if not (unknown.startswith("angular_momentum") and name.endswith(poses))
-        }
-        for unknown, names in found.items()
-    }
-
-
-@PART
-@FMI
-@SCENE
-def test_declared_dependencies_are_exactly_those_that_the_fmu_shows(raw, fmi, part):
-    running = None if part == "initial unknowns" else "exchange"
-    found = observed(raw, fmi, unknowns(raw, part), running)
-    declared = dependencies(raw, fmi, part)
-    if running:
-        declared, found = without_kept(declared), without_kept(found)
-    assert declared == found
-
-
-@FMI
-@SCENE
-def test_declared_dependencies_on_inputs_are_those_that_show_between_steps(raw, fmi):
-    inputs = set(input_names(raw))
-    declared = {
-        unknown: known & inputs
-        for part in ("outputs", "derivatives")
-        for unknown, known in dependencies(raw, fmi, part).items()
-    }
-    found = observed(raw, fmi, [*output_names(raw), *RATES], "steps")
-    assert without_kept(declared) == without_kept(found)

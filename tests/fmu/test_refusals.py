@@ -7,15 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fmpy.fmi2 import fmi2LastSuccessfulTime
-from fmpy.fmi3 import fmi3Boolean, fmi3Float64
 
-from support import DISCARD, EPS, ERROR, INF, ISS_DG, NAN, OK, Instance, body, flying, relative_error, variant
+from fmu.refusals import SINGLE, last_successful_time, outputs
+from support import DISCARD, EPS, ERROR, INF, ISS_DG, NAN, OK, Instance, flying, variant
 from support.marks import FMI
-
-# The same numbers from directions that differ by a power of two or by what is projected out: about 20
-# roundings on the way to a port's axes, twice in each element of a tensor.
-SAME_AXES_TOLERANCE = 64 * EPS
 
 TUMBLING = variant(
     ISS_DG,
@@ -24,11 +19,6 @@ TUMBLING = variant(
         "rotation": {"angular_velocity": [0.02, -0.03, 0.01], "attitude": [1.0, 2.0, 3.0, 4.0]},
     },
 )
-SINGLE = variant(
-    body(1000.0, (1.0, 2.0, 2.5), angular_velocity=[0.02, -0.03, 0.01]),
-    {"name": "single", "inputs": {"mass": ["B"], "pmi": ["B"], "torque": True}},
-)
-NOSE = "DG.nose.direction", "DG.nose.alignment"
 
 # scene, unusable values, what the log must say of them
 REFUSALS: dict[str, tuple[Mapping[str, Any], dict[str, Any], str]] = {
@@ -103,29 +93,6 @@ REFUSALS: dict[str, tuple[Mapping[str, Any], dict[str, Any], str]] = {
 }
 REFUSAL = pytest.mark.parametrize(("raw", "bad", "text"), REFUSALS.values(), ids=REFUSALS.keys())
 INDEPENDENT = ("attitude", "angular_velocity", "state.attitude", "state.angular_velocity")
-
-
-def outputs(instance: Instance) -> list[float]:
-    """Returns time, all outputs and states, read in one call."""
-    names = [
-        v.name
-        for v in instance.description.modelVariables
-        if v.causality in ("output", "independent") or v.name.startswith("state.")
-    ]
-    getter = instance.fmu.getFloat64 if instance.fmi == 3 else instance.fmu.getReal
-    return list(getter([instance.references[name] for name in names]))
-
-
-def last_successful_time(instance: Instance, h: float) -> float:
-    """Takes a step that is discarded; returns the time that the instance says it has reached."""
-    if instance.fmi == 2:
-        assert instance.step(h) == DISCARD
-        return instance.fmu.getRealStatus(fmi2LastSuccessfulTime)
-    flags, time = [fmi3Boolean(True) for _ in range(3)], fmi3Float64(NAN)
-    step = instance.fmu._functions["fmi3DoStep"]
-    assert step(instance.fmu.component, instance.time, h, True, *flags, time) == DISCARD
-    assert [flag.value for flag in flags] == [False, False, False]
-    return time.value
 
 
 def refusal(fmi: int) -> int:
@@ -449,166 +416,3 @@ def test_a_port_is_turned_and_moments_are_set_one_scalar_at_a_time_in_every_orde
     instance.free()
     assert results == {tuple(truth[1:])}
     assert refused > 0
-
-
-# What is not refused.
-
-
-@pytest.mark.parametrize(
-    ("raw", "values"),
-    [
-        (ISS_DG, {"DG.mass": 0.0}),
-        (ISS_DG, {"DG.pmi": [0.0, 0.0, 0.0]}),
-        (ISS_DG, {"DG.pmi": [0.0, 2.0, 2.0]}),
-        (ISS_DG, {"DG.pmi": [1.0, 2.0, 3.0]}),
-        (ISS_DG, {"DG.pmi": [0.8, 0.1, 0.7]}),  # 0.1 + 0.7 is one rounding less than 0.8
-        (ISS_DG, {"DG.nose.alignment": [0.0, 1.1e-6, -1.0]}),
-        (ISS_DG, {"torque": [1e12, 0.0, 0.0]}),
-        (SINGLE, {"B.mass": 1e-300}),
-        (SINGLE, {"B.pmi": [1e-9, 2.0, 2.0]}),
-        (variant(SINGLE, {"rotation": {"law": "none"}}), {"B.pmi": [0.0, 0.0, 0.0]}),
-        (variant(SINGLE, {"rotation": {"law": "none"}}), {"B.pmi": [0.0, 2.0, 2.0]}),
-    ],
-    ids=str,
-)
-@FMI
-def test_values_on_the_edge_of_what_is_allowed_are_used(fmi, raw, values):
-    with flying(raw, fmi) as instance:
-        assert instance.set(values) == OK
-        assert instance.get_status("inertia") == OK
-        assert instance.step(1e-3) == OK, instance.messages()
-
-
-DIRECTION, ALIGNMENT = np.array([1.0, 2.0, -2.0]), np.array([2.0, 1.0, 2.0])
-POWERS = [-1070, -332, -300, -150, 150, 300, 332, 1020]  # of two
-
-
-@pytest.mark.parametrize(
-    ("power_direction", "power_alignment"), [pair for p in POWERS for pair in ((p, 0), (0, p), (p, p))]
-)
-def test_directions_of_any_length_give_the_same_composite(power_direction, power_alignment):
-    with flying(ISS_DG) as instance:
-        instance.set({"DG.nose.direction": DIRECTION, "DG.nose.alignment": ALIGNMENT})
-        truth = instance.get("inertia")
-        instance.set({"DG.nose.direction": np.ldexp(DIRECTION, power_direction)})
-        instance.set({"DG.nose.alignment": np.ldexp(ALIGNMENT, power_alignment)})
-        assert instance.get_status("inertia") == OK, instance.messages()
-        assert relative_error(instance.get("inertia"), truth) <= SAME_AXES_TOLERANCE
-
-
-@pytest.mark.parametrize("power", POWERS[1:])
-@pytest.mark.parametrize(("angle", "status"), [(9e-7, DISCARD), (1.1e-6, OK)])
-def test_directions_are_judged_by_their_angle_at_any_length(angle, status, power):
-    with flying(ISS_DG) as instance:
-        alignment = DIRECTION + angle * ALIGNMENT  # both of length 3 and perpendicular
-        instance.set({"DG.nose.direction": np.ldexp(DIRECTION, power)})
-        instance.set({"DG.nose.alignment": np.ldexp(alignment, power)})
-        assert instance.get_status("inertia") == status
-
-
-def test_an_alignment_that_is_not_perpendicular_is_projected():
-    with flying(ISS_DG) as instance:
-        instance.set({"DG.nose.direction": DIRECTION, "DG.nose.alignment": ALIGNMENT})
-        truth = instance.get("inertia")
-        instance.set({"DG.nose.alignment": ALIGNMENT - 3.0 * DIRECTION})
-        assert relative_error(instance.get("inertia"), truth) <= SAME_AXES_TOLERANCE
-
-
-# Steps that cannot be taken.
-
-LIMIT = 1e7
-ANGLE = 0.5
-FAST = 100.0  # rad/s
-HOPELESS = (
-    8.6e153  # rad/s: times itself and 2500/1024, the largest moment as the law scales it, beyond all numbers
-)
-
-
-TOO_MUCH = pytest.mark.parametrize(
-    ("rates", "torque", "h", "numbers"),
-    [
-        pytest.param(
-            [0.0, 0.0, 1e9],
-            [0.0, 0.0, 0.0],
-            2.0,
-            ["communicationStepSize = 2 s", "max_angle_step = 0.5 rad", "(0, 0, 1000000000) rad/s", "1e+07"],
-            id="too fast",
-        ),
-        pytest.param(
-            [0.0, 0.0, 0.0],
-            [0.0, 0.0, 2.5e6],  # 1000 rad/s2: pi/2 * 1e10 sub-steps, most of them not foreseen at rest
-            4e3,
-            ["communicationStepSize = 4000 s", "max_angle_step = 0.5 rad", "1e+07"],
-            id="too fast on the way",
-        ),
-        pytest.param(
-            [0.0, HOPELESS, HOPELESS],
-            [0.0, 0.0, 0.0],
-            1e-156,
-            ["range of finite numbers", "(0, 8.6e+153, 8.6e+153) rad/s"],
-            id="overflow",
-        ),
-        pytest.param([0.0, 0.0, 1e200], [0.0, 0.0, 0.0], 1.0, ["(0, 0, 1e+200) rad/s"], id="beyond squares"),
-        pytest.param([0.0, 0.0, 0.1], [1e300, 0.0, 0.0], 1.0, ["communicationStepSize = 1 s"], id="torque"),
-    ],
-)
-
-
-@TOO_MUCH
-@FMI
-def test_a_step_that_cannot_be_taken_is_discarded_with_its_numbers(fmi, rates, torque, h, numbers):
-    raw = body(max_angle_step=ANGLE)
-    with flying(raw, fmi, angular_velocity_start=rates, torque=torque) as instance:
-        assert last_successful_time(instance, h) == 0.0
-        [message] = instance.messages()
-        assert [number for number in numbers if number not in message] == []
-
-
-def sub_steps(count: float) -> float:
-    """Returns the step size that takes `count` sub-steps at the rate FAST."""
-    return count * ANGLE / FAST
-
-
-@pytest.mark.parametrize(("count", "status"), [(LIMIT - 0.5, OK), (LIMIT + 0.5, DISCARD)])
-def test_ten_million_sub_steps_are_taken_and_not_one_more(count, status):
-    with flying(body(law="none", max_angle_step=ANGLE), angular_velocity_start=[0.0, FAST, 0.0]) as instance:
-        assert instance.step(sub_steps(count)) == status
-
-
-def states(instance: Instance) -> list[float]:
-    """Returns the states; energies of such rates are beyond all numbers."""
-    return [*instance.get("state.attitude"), *instance.get("state.angular_velocity")]
-
-
-@TOO_MUCH
-@FMI
-def test_a_step_that_cannot_be_taken_leaves_no_trace(fmi, rates, torque, h, numbers):
-    raw = body(max_angle_step=ANGLE)
-    start = {"angular_velocity_start": rates, "torque": torque}
-    with flying(raw, fmi, **start) as calm, flying(raw, fmi, **start) as disturbed:
-        assert disturbed.step(h) == DISCARD
-        assert states(disturbed) == states(calm)
-        for instance in (calm, disturbed):
-            assert instance.set({"torque": [0.0, 0.0, 1.0]}) == OK  # outputs are computed anew
-            # No step is short enough for a rate of which the acceleration is beyond all numbers.
-            assert instance.step(h * 1e-8) == (OK if max(rates) < HOPELESS else DISCARD)
-        assert states(disturbed) == states(calm)
-
-
-@FMI
-def test_an_energy_beyond_all_numbers_is_refused_and_the_attitude_still_read(fmi):
-    with flying(body(), fmi, angular_velocity_start=[1e200, 0.0, 0.0]) as instance:
-        assert instance.get("attitude").tolist() == [1.0, 0.0, 0.0, 0.0]
-        assert instance.get_status("kinetic_energy") == (DISCARD if fmi == 3 else ERROR)
-        assert "kinetic_energy leaves the range of finite numbers" in instance.messages()[-1]
-
-
-@FMI
-def test_flight_goes_on_with_a_shorter_step_after_one_that_was_too_long(fmi):
-    raw = body(max_angle_step=ANGLE)
-    rates = {"angular_velocity_start": [0.3 * FAST, FAST, 0.2 * FAST]}
-    with flying(raw, fmi, **rates) as calm, flying(raw, fmi, **rates) as disturbed:
-        assert [calm.step(0.1), disturbed.step(0.1)] == [OK, OK]
-        assert disturbed.step(sub_steps(2 * LIMIT)) == DISCARD
-        assert [calm.step(0.1), disturbed.step(0.1)] == [OK, OK]
-        assert outputs(disturbed) == outputs(calm)

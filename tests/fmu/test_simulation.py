@@ -9,7 +9,7 @@ from fmpy import simulate_fmu
 from scipy.integrate import solve_ivp
 
 from supervessel import reference
-from support import EPS, ISS_DG, LAWS, relative_error, scene, unpacked, variant
+from support import COMPOSITE_TOLERANCE, EPS, ISS_DG, LAWS, relative_error, scene, unpacked, variant
 from support.marks import FMI
 
 LAW = pytest.mark.parametrize("law", LAWS)
@@ -26,8 +26,6 @@ STEADY_ERROR = 1 / (120 * 2**5)
 # whose magnitudes add up to 101/2880, times elementary differentials, in units of the rate. Those are below 1
 # where the rate changes by less than its square a second.
 GENERAL_ERROR = 101 / 2880
-# Sums of 12 points with about 5 roundings each, no term larger than the largest element compared.
-COMPOSITE_TOLERANCE = 64 * EPS
 # Beside the error's term of order 4 stand terms smaller by the square of the angle turned in a step of STEP,
 # 0.1 rad at most.
 ORDER_TOLERANCE = 0.1**2
@@ -86,7 +84,7 @@ def flight(law: str, fmi: int, step: float = STEP, angle: float = ANGLE) -> np.n
 
 
 @cache
-def truth(law: str) -> np.ndarray:
+def by_scipy(law: str) -> np.ndarray:
     """Returns the states at multiples of STEP, (n, 7), by a method of order 8 with all its digits."""
     flown = scene(raw_scene(law))
     state = np.array([*flown.rotation.attitude, *RATES])
@@ -113,43 +111,43 @@ def states(result: np.ndarray) -> np.ndarray:
 
 def turned(law: str) -> float:
     """Returns the angle of the whole flight, [rad]."""
-    return float(np.trapezoid(np.linalg.norm(truth(law)[:, 4:], axis=1), dx=STEP))
+    return float(np.trapezoid(np.linalg.norm(by_scipy(law)[:, 4:], axis=1), dx=STEP))
 
 
 @LAW
 def test_the_flight_is_one_that_the_tolerances_hold_for(law):
     for begin, end, inputs in pieces():
         torque = [inputs[f"torque[{i}]"] for i in (1, 2, 3)]
-        for state in truth(law)[round(begin / STEP) : round(end / STEP) + 1]:
+        for state in by_scipy(law)[round(begin / STEP) : round(end / STEP) + 1]:
             change = reference.ode(scene(raw_scene(law)), state, torque, inputs)[4:]
             assert np.linalg.norm(change) <= np.linalg.norm(state[4:]) ** 2
 
 
 @FMI
 def test_attitude_at_a_given_rate_follows_the_differential_equation(fmi):
-    error = np.abs(states(flight("none", fmi)) - truth("none"))
+    error = np.abs(states(flight("none", fmi)) - by_scipy("none"))
     assert error[:, :4].max() <= STEADY_ERROR * ANGLE**4 * turned("none")
 
 
 @FMI
 @pytest.mark.parametrize("law", LAWS[1:])
 def test_rate_follows_the_differential_equation(fmi, law):
-    fastest = np.linalg.norm(truth(law)[:, 4:], axis=1).max()
-    error = np.abs(states(flight(law, fmi)) - truth(law))
+    fastest = np.linalg.norm(by_scipy(law)[:, 4:], axis=1).max()
+    error = np.abs(states(flight(law, fmi)) - by_scipy(law))
     assert error[:, 4:].max() <= GENERAL_ERROR * ANGLE**4 * turned(law) * fastest
 
 
 @FMI
 @pytest.mark.parametrize("law", LAWS[1:])
 def test_attitude_follows_the_differential_equation(fmi, law):
-    error = np.abs(states(flight(law, fmi)) - truth(law))
+    error = np.abs(states(flight(law, fmi)) - by_scipy(law))
     # Errors of its own, and half the angle by which the rate's error, growing all the time, turns it.
     assert error[:, :4].max() <= GENERAL_ERROR * ANGLE**4 * turned(law) * (1 + turned(law) / 4)
 
 
 @pytest.mark.parametrize("law", ["none", "tensor"])
 def test_the_error_falls_with_the_fourth_power_of_the_step(law):
-    end = truth(law)[-1]
+    end = by_scipy(law)[-1]
     coarse, fine = (
         np.abs(states(flight(law, 3, step, angle=1.0))[-1] - end).max() for step in (STEP, STEP / 2)
     )
@@ -196,7 +194,7 @@ def test_outputs_are_those_of_the_end_of_the_step_under_the_inputs_of_the_step(f
 @FMI
 def test_inputs_may_jump_between_the_points_of_output(fmi):
     end = states(flight("tensor", fmi, step=0.7))[-1]
-    error = np.abs(end - truth("tensor")[-1])
+    error = np.abs(end - by_scipy("tensor")[-1])
     assert error.max() <= GENERAL_ERROR * ANGLE**4 * turned("tensor") * (1 + turned("tensor") / 4)
 
 

@@ -32,7 +32,7 @@ TORQUE = np.array([0.15, -0.3, 0.2])  # N m
 # Truth
 
 
-def truth(law: str, J: Array, torque: Array, start: Array, duration: float) -> Vector:
+def by_series(law: str, J: Array, torque: Array, start: Array, duration: float) -> Vector:
     """Returns the state after the duration, (7,), its attitude at unit length."""
     end = flight(law, J, start, torque, duration)
     length = norm(end[:4])
@@ -64,7 +64,7 @@ def test_truth_follows_a_symmetric_top() -> None:
         ]
         start = np.array([1.0, 0.0, 0.0, 0.0, *RATES])
         for law in ("principal", "tensor"):
-            true = truth(law, np.diag([a, a, c]), np.zeros(3), start, duration)
+            true = by_series(law, np.diag([a, a, c]), np.zeros(3), start, duration)
             off = [t - x for t, x in zip(true, [*spun, *rate], strict=True)]
             assert max(map(abs, off)) < 1e-24
 
@@ -263,7 +263,7 @@ COUNTS_SPUN_UP = {("dop853", 0): 16, ("taylor", 8): 16, ("taylor", 12): 8}
 
 @cache
 def true_end(law: str, duration: float) -> tuple[Number, ...]:
-    return tuple(truth(law, TILTED, TORQUE, START, duration))
+    return tuple(by_series(law, TILTED, TORQUE, START, duration))
 
 
 def after(one: Step, count: int) -> Array:
@@ -339,8 +339,8 @@ def random_case(seed: int) -> tuple[str, Array, Array, Array, float]:
 
 
 @cache
-def random_truth(seed: int) -> tuple[Number, ...]:
-    return tuple(truth(*random_case(seed)))
+def random_end(seed: int) -> tuple[Number, ...]:
+    return tuple(by_series(*random_case(seed)))
 
 
 def relative(state: Array, true: tuple[Number, ...]) -> float:
@@ -357,7 +357,7 @@ def test_controller_meets_the_tolerance(method: str, tolerance: float) -> None:
         law, J, torque, start, duration = random_case(seed)
         one = for_tolerance(law, method, tolerance)
         end, _ = controlled(one, J, torque, start, duration, tolerance=tolerance, safety=SAFETY[method])
-        shares.append(relative(end, random_truth(seed)) / tolerance)
+        shares.append(relative(end, random_end(seed)) / tolerance)
     assert sum(share > 1.0 for share in shares) <= 1  # of 60
     assert max(shares) < 10.0
 
@@ -395,7 +395,7 @@ def test_tightest_tolerance_neither_stalls_nor_misses_what_rounding_allows(metho
             safety=SAFETY[method],
         )
         bound = 16 * U * (1.0 + condition(step(law, "taylor", 20), J, torque, start, duration))
-        assert relative(end, random_truth(seed)) <= bound
+        assert relative(end, random_end(seed)) <= bound
         assert count <= most * (1.0 + duration)
 
 
@@ -407,8 +407,8 @@ SPIN_UP = (
 
 
 @cache
-def spin_up_truth() -> tuple[Number, ...]:
-    return tuple(truth("principal", *SPIN_UP, 40.0))
+def spin_up_end() -> tuple[Number, ...]:
+    return tuple(by_series("principal", *SPIN_UP, 40.0))
 
 
 @pytest.mark.parametrize(
@@ -419,7 +419,7 @@ def test_constant_torque_takes_few_steps(tolerance: float, method: str, most: in
     J, torque, start = SPIN_UP
     one = for_tolerance("principal", method, tolerance)
     end, count = controlled(one, J, torque, start, 40.0, tolerance=tolerance, safety=SAFETY[method])
-    assert relative(end, spin_up_truth()) <= tolerance
+    assert relative(end, spin_up_end()) <= tolerance
     assert count <= most
 
 

@@ -142,7 +142,7 @@ def ways(folder: Path) -> list[Way]:
     return [*found, Way("pythonfmu, RK4 in Python", "pythonfmu", by_ladder(fliers.python_fmu(folder)))]
 
 
-def truth(work: Work) -> list[float]:
+def by_series(work: Work) -> list[float]:
     """Returns the attitude at the end, from a series with 20 digits."""
     inertia = np.diag(fliers.MOMENTS).tolist()
     end = series.flight("tensor", inertia, fliers.START, work.torque, fliers.DURATION, digits=20)
@@ -192,7 +192,7 @@ def _cell(result: Measured | str, unit: float) -> str:
 
 def main(packages: list[str]) -> None:
     """Prints the table, then the settings."""
-    ends = {name: truth(work) for name, work in WORKS.items() if work.spans == 1}
+    ends = {name: by_series(work) for name, work in WORKS.items() if work.spans == 1}
     ends |= {name: ends[name.replace("every 0.1 s", "one step")] for name in WORKS}
     with tempfile.TemporaryDirectory() as name:
         rows = [

@@ -17,6 +17,14 @@ EPS = 2.0**-52
 U = EPS / 2
 """The largest relative error of a rounding."""
 
+UNIT_TOLERANCE = 4 * EPS
+"""A quotient by the root of a sum of four squares is off by at most 2 EPS relative in each component; taking
+the norm again rounds by up to EPS more."""
+
+COMPOSITE_TOLERANCE = 64 * EPS
+"""Sums of 12 points, those of two vessels, with about 5 roundings each, no term larger than the largest
+element compared."""
+
 
 def relative_error(value: Any, truth: Any) -> float:
     """Returns the largest difference over the largest magnitude of the truth."""
