@@ -11,7 +11,7 @@ LOWEST := tests/model tests/orbiter tests/build/test_build.py tests/build/test_s
   $(wildcard tests/build/test_scene_*.py) \
   tests/fmu/test_simulation.py tests/fmu/test_model_description.py tests/fmu/test_model_structure.py \
   $(wildcard tests/fmu/test_*exchange*.py) \
-  tests/twin/test_twin.py tests/twin/test_error_state.py tests/trade/test_trade.py \
+  tests/twin/test_twin.py tests/twin/test_twin_reference.py tests/twin/test_error_state.py tests/trade/test_trade.py \
   tests/examples/test_lqr_hold.py tests/examples/test_identify.py
 
 .PHONY: run test check lowest constraints platforms robustness stability accuracy surroundings bench slews peers clean
