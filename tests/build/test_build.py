@@ -20,7 +20,7 @@ from fmu_build.generate.model import generate
 from fmu_build.generate.sources import source_file_names, source_files
 from fmu_build.platforms import PLATFORMS, host_platform
 from supervessel import load_scene
-from support import BALL, ISS_DG, body, built, scene, variant
+from support import BALL, ISS_DG, PARAMETERS, STATES, body, built, scene, variant
 from support.marks import FMI
 
 LAYER = Path(fmu_build.__file__).parent / "c"
@@ -113,17 +113,10 @@ def test_the_same_scene_in_other_words_keeps_the_token(tmp_path, text):
     assert tokens[0] == tokens[1]
 
 
-PARAMETERS = [
-    *(f"angular_velocity_start[{i}]" for i in (1, 2, 3)),
-    *(f"attitude_start[{i}]" for i in (1, 2, 3, 4)),
-]
-
-
 def vector(name: str, size: int = 3) -> list[str]:
     return [f"{name}[{i}]" for i in range(1, size + 1)]
 
 
-STATES = [*vector("state.attitude", 4), *vector("state.angular_velocity")]
 LOCALS = [*STATES, *(f"der({state})" for state in STATES)]
 
 

@@ -14,9 +14,7 @@ from fmpy import read_model_description
 from supervessel.problems import printable
 from support import BALL
 from support.compilers import fake_compiler
-from support.processes import needs_posix
-
-ROOT = Path(__file__).parents[2]
+from support.processes import ROOT, needs_posix
 
 BROKEN = BALL.replace("mass = 2.0", "mass = -2.0").replace('root = "B"', 'root = "C"') + "colour = 3\n"
 

@@ -16,8 +16,8 @@ from orbiter.files import Files
 from supervessel import SceneError, load_scene, parse_scene
 from supervessel.problems import LONGEST_PROBLEM, LONGEST_WORD, UNSEEN, printable
 from support import BALL, ISS_DG, variant
+from support.processes import ROOT
 
-ROOT = Path(__file__).parents[2]
 HOSTILE = {
     "a terminal sequence": ("\x1b[31mred", r"\x1b[31mred"),
     "a title of a terminal": ("\x1b]0;x\x07", r"\x1b]0;x\x07"),

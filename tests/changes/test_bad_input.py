@@ -73,12 +73,6 @@ def step(instance: Instance) -> int:
     return instance.step(0.25)
 
 
-def update(instance: Instance) -> int:
-    return instance._status(
-        instance.fmu.updateDiscreteStates if instance.fmi == 3 else instance.fmu.newDiscreteStates
-    )
-
-
 def leave_event_mode(instance: Instance) -> int:
     return instance._status(instance.fmu.enterContinuousTimeMode)
 
@@ -104,8 +98,8 @@ JUDGES = [
     ("cs stepping", step, (2, 3)),
     ("cs stepping", read, (3,)),
     ("cs stepping", directional, (3,)),
-    ("events event", update, (3,)),
-    ("me event", update, (3,)),
+    ("events event", Instance.update, (3,)),
+    ("me event", Instance.update, (3,)),
     ("me event", leave_event_mode, (3,)),
     ("me event", read, (2, 3)),
     ("me event", rates, (2, 3)),

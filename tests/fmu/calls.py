@@ -54,8 +54,7 @@ class Raw:
 
     def read(self) -> list[float]:
         """Returns every variable, which is allowed after an error as well."""
-        getter = self.fmu.getFloat64 if self.fmi == 3 else self.fmu.getReal
-        return list(getter(list(self.instance.references.values())))
+        return self.instance.everything()
 
     def fly(self) -> list[float]:
         """Initialises, takes a step or goes on to continuous-time mode; returns every variable."""

@@ -9,16 +9,8 @@ from typing import Any
 import pytest
 from lxml import etree
 
-from support import ISS_DG, body, built, variant
+from support import ISS_DG, STATES, body, built, variant
 
-PARAMETERS = [
-    *(f"angular_velocity_start[{i}]" for i in (1, 2, 3)),
-    *(f"attitude_start[{i}]" for i in (1, 2, 3, 4)),
-]
-STATES = [
-    *(f"state.attitude[{i}]" for i in (1, 2, 3, 4)),
-    *(f"state.angular_velocity[{i}]" for i in (1, 2, 3)),
-]
 RATES = [f"der({state})" for state in STATES]
 SIZES = {"mass": 0, "kinetic_energy": 0, "attitude": 4}  # elements of an output; 3 if not listed
 NINE = [f"inertia[{i},{j}]" for i in (1, 2, 3) for j in (1, 2, 3)]

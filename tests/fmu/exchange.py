@@ -7,14 +7,10 @@ from typing import Any
 import numpy as np
 from fmpy.fmi2 import fmi2EventInfo
 
-from support import ERROR, ISS_DG, OK, Instance, variant
+from support import ERROR, ISS_DG, OK, TURNING, Instance, variant
 
-RATES, ATTITUDE = [0.05, -0.08, 0.11], [0.5, -0.5, 0.7, 0.1]
-RAW = variant(ISS_DG, {"name": "exchanged", "rotation": {"angular_velocity": RATES, "attitude": ATTITUDE}})
-STATES = [
-    *(f"state.attitude[{i}]" for i in (1, 2, 3, 4)),
-    *(f"state.angular_velocity[{i}]" for i in (1, 2, 3)),
-]
+RATES, ATTITUDE = TURNING["angular_velocity"], TURNING["attitude"]
+RAW = variant(ISS_DG, {"name": "exchanged", "rotation": TURNING})
 
 
 def start(raw: dict[str, Any] = RAW, fmi: int = 3, mode: str = "continuous") -> Instance:

@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from support import ISS_DG, OK, PROPAGATORS, Array, Instance, random_rotation, variant
+from support import ISS_DG, OK, PROPAGATORS, TURNING, Array, Instance, random_rotation, variant
 from support.series import Vector, flight, norm
 
 FREE = ("exact", "auto")  # what free motion is exact for
 EVERY = pytest.mark.parametrize("propagator", PROPAGATORS)
 
 OUTPUTS = [*ISS_DG["outputs"]["names"], "principal_moments", "principal_axes", "error_estimate"]
-RATES = [0.05, -0.08, 0.11]
-ATTITUDE = [0.5, -0.5, 0.7, 0.1]
+RATES, ATTITUDE = TURNING["angular_velocity"], TURNING["attitude"]
 MOMENTS = (1000.0, 2000.0, 2500.0)
 TILT = random_rotation(3)
 TILTED = TILT @ np.diag(MOMENTS) @ TILT.T
@@ -62,12 +61,6 @@ def tilted(propagator: str, law: str = "tensor", steer: bool = True) -> dict[str
 def state(instance: Instance) -> Array:
     """Returns attitude and angular velocity, (7,)."""
     return np.concatenate([instance.get("state.attitude"), instance.get("state.angular_velocity")])
-
-
-def bits(instance: Instance) -> list[str]:
-    """Returns every variable, in hexadecimal."""
-    getter = instance.fmu.getFloat64 if instance.fmi == 3 else instance.fmu.getReal
-    return [value.hex() for value in getter(list(instance.references.values()))]
 
 
 @contextmanager

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from supervessel import Twin
-from support import EPS, ISS_DG, OK, Instance, body, scene, variant
+from support import EPS, ISS_DG, OK, TURNING, Instance, body, scene, variant
 
 SEED = 20240609
 
-SHIP = {"angular_velocity": [0.05, -0.08, 0.11], "attitude": [0.5, -0.5, 0.7, 0.1]}
-RAW = variant(ISS_DG, {"name": "derived", "rotation": SHIP})
+RAW = variant(ISS_DG, {"name": "derived", "rotation": TURNING})
 CHAIN: dict[str, Any] = {
     "name": "chain",
     "root": "A",
@@ -48,7 +47,7 @@ CHAIN: dict[str, Any] = {
     },
     "docks": [{"ports": ["A.one", "B.aft"]}, {"ports": ["C.aft", "B.fore"]}, {"ports": ["A.two", "D.aft"]}],
     "inputs": {"mass": ["A", "C", "D"], "pmi": ["B"], "pose": ["A.one", "B.fore", "C.aft"], "torque": True},
-    "rotation": SHIP,
+    "rotation": TURNING,
     "outputs": ISS_DG["outputs"],
 }
 SCENES: dict[str, dict[str, Any]] = {
@@ -57,7 +56,7 @@ SCENES: dict[str, dict[str, Any]] = {
     "principal": variant(RAW, {"name": "principal", "rotation.law": "principal"}),
     "decoupled": variant(RAW, {"name": "decoupled", "rotation.law": "decoupled"}),
     "none": variant(RAW, {"name": "held", "rotation.law": "none"}),
-    "without inputs": {**body(**SHIP), "name": "constant", "inputs": {}},
+    "without inputs": {**body(**TURNING), "name": "constant", "inputs": {}},
 }
 NAME = pytest.mark.parametrize("name", SCENES)
 

@@ -50,24 +50,18 @@ def ask(
     return int(instance.fmu._functions[name](instance.fmu.component, *arguments))
 
 
-def spread(instance: Instance) -> list[float]:
-    """Returns every variable."""
-    getter = instance.fmu.getFloat64 if instance.fmi == 3 else instance.fmu.getReal
-    return list(getter(list(instance.references.values())))
-
-
 @WAY
 @pytest.mark.parametrize("misuse", MISUSES)
 def test_a_variable_of_the_wrong_kind_is_an_error_that_names_it(fmi, misuse, adjoint):
     rows, by, text = MISUSES[misuse]
     instance = standing("tensor", values("tensor", "start"), fmi)
-    before = spread(instance)
+    before = instance.everything()
     numbers = [[instance.references[name] for name in names] for names in (rows, by)]
     sizes = [len(rows), len(by)] if adjoint else [len(by), len(rows)]
     assert ask(instance, *numbers, *([1.0] * n for n in sizes), adjoint=adjoint) == ERROR
     [message] = instance.messages()
     assert text in message
-    assert spread(instance) == before
+    assert instance.everything() == before
     instance.free()
 
 
@@ -172,13 +166,13 @@ def test_derivatives_leave_all_values_and_the_flight_as_they_were(fmi):
     asked, other = (standing("tensor", at, fmi, exchange=False) for _ in range(2))
     rows, by = unknowns("tensor"), knowns("tensor")
     for _ in range(3):
-        before = spread(asked)
+        before = asked.everything()
         columns(asked, rows, by)
         if fmi == 3:
             transposed_rows(asked, rows, by)
         time_derivatives(asked, twin("tensor").y_names)
-        assert spread(asked) == before
+        assert asked.everything() == before
         assert [asked.step(0.7), other.step(0.7)] == [OK, OK]
-    assert spread(asked) == spread(other)
+    assert asked.everything() == other.everything()
     asked.free()
     other.free()

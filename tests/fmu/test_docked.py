@@ -47,7 +47,7 @@ def brought(fmi: int, place: str, raw: Any = DOCKING) -> Instance:
     if state not in ("instantiated", "initialising"):
         assert instance.exit() == OK
     if interface == "events" and state == "stepping":
-        assert update(instance) == OK
+        assert instance.update() == OK
         assert instance._status(instance.fmu.enterStepMode) == OK
     if interface == "me" and state == "continuous":
         assert instance.run() == OK
@@ -55,12 +55,6 @@ def brought(fmi: int, place: str, raw: Any = DOCKING) -> Instance:
         assert instance._status(instance.fmu.terminate) == OK
     instance.log.clear()
     return instance
-
-
-def update(instance: Instance) -> int:
-    return instance._status(
-        instance.fmu.updateDiscreteStates if instance.fmi == 3 else instance.fmu.newDiscreteStates
-    )
 
 
 def set_boolean(instance: Instance, names: Sequence[str], values: Sequence[bool]) -> int:
@@ -209,12 +203,12 @@ def test_a_boolean_is_no_known_of_a_derivative(fmi):
 
 def test_co_simulation_goes_from_initialisation_through_event_mode_to_steps_and_back():
     instance = brought(3, "events, event")
-    assert update(instance) == OK
+    assert instance.update() == OK
     assert instance._status(instance.fmu.enterStepMode) == OK
     assert instance.step(0.5) == OK
     assert instance._status(instance.fmu.enterEventMode) == OK
     assert instance.set({"berth.docked": False}) == OK
-    assert update(instance) == OK
+    assert instance.update() == OK
     assert instance._status(instance.fmu.enterStepMode) == OK
     assert instance.fmu.doStep(0.5, 0.5) == (False, False, False, 1.0)
     assert instance.get("mass") == ISS

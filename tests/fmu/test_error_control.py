@@ -14,7 +14,6 @@ from fmu.flights import (
     TORQUE,
     WEAK_TORQUE,
     assembly,
-    bits,
     enter,
     error,
     fly,
@@ -89,7 +88,7 @@ def test_reset_forgets_the_importers_tolerance(fmi):
         assert instance.exit() == OK
         instance.time = 0.0
         fly(instance, SPAN)
-        ends.append(bits(instance))
+        ends.append(instance.bits())
         assert instance.reset() == OK
     instance.free()
     assert ends[0] == ends[2] != ends[1]

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fmu.exchange import RATES, RAW, STATES, get_rates, raw_call, raw_update, start
-from support import DISCARD, ERROR, OK, Instance
+from fmu.exchange import RATES, RAW, get_rates, raw_call, raw_update, start
+from support import DISCARD, ERROR, OK, STATES, Instance
 from support.marks import FMI
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fmu.flights import FREE, TORQUE, angle, assembly, bits, error, fly, state, tilted
+from fmu.flights import FREE, TORQUE, angle, assembly, error, fly, state, tilted
 from supervessel.equations import equations, p_start
 from support import DISCARD, OK, Instance, U, flying, scene
 from support.marks import FMI
@@ -73,19 +73,19 @@ def test_the_epoch_is_part_of_a_saved_state(fmi, propagator, count):
         saved = instance.fmu.getFMUState()
         content, time = saved_bytes(instance), instance.time
         fly(instance, 0.1, 50)
-        end = bits(instance)
+        end = instance.bits()
         instance.fmu.setFMUState(saved)
         instance.fmu.freeFMUState(saved)
         instance.time = time
         fly(instance, 0.1, 50)
-        assert bits(instance) == end
+        assert instance.bits() == end
     other = Instance(raw, fmi)
     restored = other.fmu.deserializeFMUState(content)
     other.fmu.setFMUState(restored)
     other.fmu.freeFMUState(restored)
     other.time = time
     fly(other, 0.1, 50)
-    assert bits(other) == end
+    assert other.bits() == end
     other.free()
 
 
@@ -134,7 +134,7 @@ def test_reset_forgets_the_epoch(propagator):
         assert instance.initialise(**turned) == OK
         for it in (instance, new):
             fly(it, 0.1, 30)
-        assert bits(instance) == bits(new)
+        assert instance.bits() == new.bits()
 
 
 def change_nothing(instance: Instance) -> None:
@@ -153,7 +153,7 @@ def test_values_set_there_and_back_between_steps_leave_the_flight_as_it_was(prop
             for instance in (straight, restless):
                 fly(instance, 0.1)
         restless.set({"torque[1]": 0.0})
-        assert bits(restless) == bits(straight)
+        assert restless.bits() == straight.bits()
 
 
 @pytest.mark.parametrize("propagator", FREE)
@@ -166,7 +166,7 @@ def test_values_read_while_they_were_other_leave_the_flight_as_it_was(propagator
             assert read.set({"DG.mass": mass}) == OK
             for instance in (straight, read):
                 fly(instance, 0.1)
-        assert bits(read) == bits(straight)
+        assert read.bits() == straight.bits()
 
 
 @pytest.mark.parametrize(
@@ -205,15 +205,15 @@ def test_exact_discards_torque_with_its_value_and_goes_on_without(fmi):
         for it in (instance, straight):
             fly(it, 0.1, 5)
         assert instance.set({"torque": [0.0, -2.5, 1e-300]}) == OK
-        before = bits(instance)
+        before = instance.bits()
         assert instance.step(0.1) == DISCARD
         [message] = instance.messages()
         assert "torque = (0, -2.5, 1e-300) N.m: must be 0 for the propagator exact" in message
-        assert bits(instance) == before
+        assert instance.bits() == before
         assert instance.set({"torque": [0.0, 0.0, 0.0]}) == OK
         for it in (instance, straight):
             fly(it, 0.1, 5)
-        assert bits(instance) == bits(straight)
+        assert instance.bits() == straight.bits()
 
 
 def test_a_step_under_torque_that_is_discarded_leaves_the_epoch():
@@ -225,4 +225,4 @@ def test_a_step_under_torque_that_is_discarded_leaves_the_epoch():
         assert instance.set({"torque": [0.0, 0.0, 0.0]}) == OK
         for it in (instance, straight):
             fly(it, 0.1, 30)
-        assert bits(instance) == bits(straight)
+        assert instance.bits() == straight.bits()

@@ -9,7 +9,7 @@ import pytest
 from fmpy import extract
 
 from supervessel import Twin
-from support import ISS_DG, body, built, relative_error, scene, variant
+from support import ISS_DG, TURNING, body, built, relative_error, scene, variant
 from support.marks import FMI
 
 SEED = 20240614
@@ -18,7 +18,6 @@ SEED = 20240614
 # ten within a row: 1e3 EPS, rounded up.
 TOLERANCE = 1e-12
 
-TURNING = {"angular_velocity": [0.05, -0.08, 0.11], "attitude": [0.5, -0.5, 0.7, 0.1]}
 PORT = {"direction": [-1.0, 0, 0], "alignment": [0, 1.0, 0]}
 SCENES: dict[str, dict[str, Any]] = {
     "ISS": ISS_DG,

@@ -15,10 +15,8 @@ from lxml import etree
 from fmu.descriptions import (
     CHAIN,
     NINE,
-    PARAMETERS,
     RATES,
     SCENE,
-    STATES,
     input_names,
     output_names,
     start_of,
@@ -26,7 +24,7 @@ from fmu.descriptions import (
     xml,
 )
 from supervessel import reference
-from support import EPS, ISS_DG, Instance, built, flying, scene
+from support import EPS, ISS_DG, PARAMETERS, STATES, Instance, built, flying, scene
 from support.marks import FMI
 
 # SI exponents, from the definitions N = kg m/s2 and J = N m.

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fmu.exchange import ATTITUDE, RATES, RAW, STATES, get_rates, raw_update, scalars, start
+from fmu.exchange import ATTITUDE, RATES, RAW, get_rates, raw_update, scalars, start
 from supervessel import reference
 from support import (
     COMPOSITE_TOLERANCE,
@@ -16,6 +16,7 @@ from support import (
     INF,
     NAN,
     OK,
+    STATES,
     UNIT_TOLERANCE,
     Instance,
     draw_inputs,

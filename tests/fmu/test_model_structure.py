@@ -8,10 +8,8 @@ import pytest
 from lxml import etree
 
 from fmu.descriptions import (
-    PARAMETERS,
     RATES,
     SCENE,
-    STATES,
     groups,
     input_names,
     output_names,
@@ -20,7 +18,7 @@ from fmu.descriptions import (
     variables,
     xml,
 )
-from support import OK, Instance
+from support import OK, PARAMETERS, STATES, Instance
 from support.marks import FMI
 
 SEED = 20240611

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fmu.flights import EVERY, FREE, angle, assembly, bits, error, fly, state
+from fmu.flights import EVERY, FREE, angle, assembly, error, fly, state
 from support import DISCARD, INF, OK, Instance, U, body, flying
 from support.marks import FMI
 
@@ -34,7 +34,7 @@ def test_split_discards_a_step_that_needs_too_many_and_takes_a_shorter_one():
         )
         for it in (instance, straight):
             fly(it, 1e-4)
-        assert bits(instance) == bits(straight)
+        assert instance.bits() == straight.bits()
 
 
 REFUSED = "turns the body by {} rad; it is followed for 2e+09 rad in a step"
@@ -55,7 +55,7 @@ def test_free_motion_beyond_its_reach_is_discarded_with_the_numbers(propagator):
         refused(instance, 1e5, "rad/s")
         for it in (instance, straight):  # from the same epoch
             fly(it, 1e-3, 7)
-        assert bits(instance) == bits(straight)
+        assert instance.bits() == straight.bits()
 
 
 @FMI

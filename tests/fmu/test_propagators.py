@@ -22,7 +22,6 @@ from fmu.flights import (
     WEAK_TORQUE,
     angle,
     assembly,
-    bits,
     error,
     fly,
     state,
@@ -132,7 +131,7 @@ def test_auto_is_exact_to_the_bit_while_the_motion_is_free():
         for h in (0.1, 3.0, 1e-9, 500.0):
             for instance in (auto, exact):
                 fly(instance, h, 3)
-            assert bits(auto) == bits(exact)
+            assert auto.bits() == exact.bits()
 
 
 @pytest.mark.parametrize(("of_scene", "in_force"), [(1e-3, 1e-3), (1e-9, 1e-9), (1e-3, 1e-9), (1e-9, 1e-3)])
@@ -143,7 +142,7 @@ def test_auto_takes_taylor_steps_for_the_tolerance_in_force_under_torque(of_scen
             for instance in (auto, other):
                 assert instance.set({"torque": TORQUE}) == OK
                 fly(instance, h, 3)
-            assert bits(auto) == bits(other)
+            assert auto.bits() == other.bits()
 
 
 def test_auto_steps_where_the_composite_has_just_changed_and_flies_free_again_after_that():

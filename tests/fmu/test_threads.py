@@ -28,11 +28,6 @@ def draw(generator: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def everything(instance: Instance) -> bytes:
-    getter = instance.fmu.getFloat64 if instance.fmi == 3 else instance.fmu.getReal
-    return np.array(getter(list(instance.references.values()))).tobytes()
-
-
 def life(instance: Instance, exchange: bool, seed: int) -> list[bytes]:
     """Returns every variable after each of some long steps, refusals, derivatives, saved states between."""
     generator = np.random.default_rng(seed)
@@ -48,7 +43,7 @@ def life(instance: Instance, exchange: bool, seed: int) -> list[bytes]:
             instance.set({"state.angular_velocity": generator.normal(size=3)})
         else:
             assert instance.step(500.0) == OK  # s: a thousand sub-steps
-        rows.append(everything(instance))
+        rows.append(np.array(instance.everything()).tobytes())
         rows.append(instance.directional(["inertia[1,2]"], ["DG.nose.position[2]"], [1.0]).tobytes())
         instance.set({"DG.mass": -1.0})
         if exchange or instance.fmi == 3:

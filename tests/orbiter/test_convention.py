@@ -1,7 +1,6 @@
 """The convention "orbiter": sums of points in reference, twin and FMU, and only where it is asked for."""
 
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +10,7 @@ from supervessel import SceneError, Twin, parse_scene, reference
 from support import ISS_DG, OK, flying, relative_error, scene, variant
 from support.pages import text
 from support.marks import FMI
-
-ROOT = Path(__file__).parents[2]
+from support.processes import ROOT
 
 AGREEMENT = 1e-13
 """Twelve points of some ten operations each, every one good to 1.1e-16 of the largest sum: 900 roundings."""

@@ -5,7 +5,6 @@ import os
 import subprocess
 import sys
 import tomllib
-from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -14,8 +13,7 @@ from hypothesis import strategies as st
 from orbiter.files import HUB, SCENARIO, TABLE
 from supervessel import parse_scene
 from supervessel.orbiter import ScenarioError
-
-ROOT = Path(__file__).parents[2]
+from support.processes import ROOT
 
 HUB_FILE = "Config/Vessels/Hub.cfg"
 DOCKED = "; docked are Station + GL-01"

@@ -1,6 +1,18 @@
 """Shared by the tests: scenes, numbers, FMUs; further subjects have modules of their own."""
 
-from support.fmus import DISCARD, ERROR, OK, WARNING, Instance, built, flying, store, unpacked
+from support.fmus import (
+    DISCARD,
+    ERROR,
+    OK,
+    PARAMETERS,
+    STATES,
+    WARNING,
+    Instance,
+    built,
+    flying,
+    store,
+    unpacked,
+)
 from support.numbers import (
     COMPOSITE_TOLERANCE,
     EPS,
@@ -13,7 +25,7 @@ from support.numbers import (
     random_rotation,
     relative_error,
 )
-from support.scenes import BALL, ISS_DG, LAWS, PROPAGATORS, body, draw_inputs, scene, variant
+from support.scenes import BALL, ISS_DG, LAWS, PROPAGATORS, TURNING, body, draw_inputs, scene, variant
 
 __all__ = [
     "BALL",
@@ -26,7 +38,10 @@ __all__ = [
     "LAWS",
     "NAN",
     "OK",
+    "PARAMETERS",
     "PROPAGATORS",
+    "STATES",
+    "TURNING",
     "UNIT_TOLERANCE",
     "WARNING",
     "Array",

@@ -27,6 +27,15 @@ from support.traps import watch
 
 OK, WARNING, DISCARD, ERROR = range(4)
 
+STATES = [
+    *(f"state.attitude[{i}]" for i in (1, 2, 3, 4)),
+    *(f"state.angular_velocity[{i}]" for i in (1, 2, 3)),
+]
+PARAMETERS = [
+    *(f"angular_velocity_start[{i}]" for i in (1, 2, 3)),
+    *(f"attitude_start[{i}]" for i in (1, 2, 3, 4)),
+]
+
 
 @cache
 def store() -> Path:
@@ -154,8 +163,11 @@ class Instance:
 
     def run(self) -> int:
         """Takes an initialised instance of model exchange on to continuous-time mode."""
-        update = self.fmu.updateDiscreteStates if self.fmi == 3 else self.fmu.newDiscreteStates
-        return self._status(update) or self._status(self.fmu.enterContinuousTimeMode)
+        return self.update() or self._status(self.fmu.enterContinuousTimeMode)
+
+    def update(self) -> int:
+        """Updates discrete states in event mode."""
+        return self._status(self.fmu.updateDiscreteStates if self.fmi == 3 else self.fmu.newDiscreteStates)
 
     def directional(self, unknowns: Sequence[str], knowns: Sequence[str], seed: Any) -> np.ndarray:
         """Returns the directional derivative of unknowns by knowns along a seed."""
@@ -205,6 +217,15 @@ class Instance:
         getter = self.fmu.getFloat64 if self.fmi == 3 else self.fmu.getReal
         numbers = np.array(getter([self.references[element] for element in self.names(name)]))
         return float(numbers[0]) if name in self.references else numbers
+
+    def everything(self) -> list[float]:
+        """Returns every variable of an FMU that has no Booleans, by one call."""
+        getter = self.fmu.getFloat64 if self.fmi == 3 else self.fmu.getReal
+        return list(getter(list(self.references.values())))
+
+    def bits(self) -> list[str]:
+        """Returns the same in hexadecimal."""
+        return [number.hex() for number in self.everything()]
 
     def get_status(self, name: str) -> int:
         return self._status(self.get, name)

@@ -11,6 +11,9 @@ from supervessel import Scene, parse_scene
 LAWS = ("none", "decoupled", "principal", "tensor")
 PROPAGATORS = ("rk4", "dop853", "taylor", "exact", "split", "auto")
 
+TURNING = {"angular_velocity": [0.05, -0.08, 0.11], "attitude": [0.5, -0.5, 0.7, 0.1]}
+"""A start about no axis in particular, of a table [rotation]."""
+
 ISS_DG: dict[str, Any] = {
     "name": "iss_dg",
     "root": "ISS",

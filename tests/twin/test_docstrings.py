@@ -15,8 +15,7 @@ import fmu_build
 import supervessel
 from supervessel import Twin, load_scene, reference
 from supervessel.twin.functions import TwinFunction
-
-ROOT = Path(__file__).parents[2]
+from support.processes import ROOT
 
 
 def documented() -> Iterator[tuple[str, str | None]]:

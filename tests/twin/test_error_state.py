@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from supervessel import Twin
 from support import ISS_DG, Array, U, body, scene, variant
+from twin.scenes import numbers
 
 FORMS = ("vec", "rotvec", "mrp")
 FORM = pytest.mark.parametrize("form", FORMS)
@@ -33,10 +34,6 @@ ASYMMETRIC = {"inertia": [[900.0, 60.0, -40.0], [60.0, 1500.0, 50.0], [-40.0, 50
 @cache
 def twin(form: Any = "rotvec") -> Twin:
     return Twin(scene(SMALL), error_form=form)
-
-
-def numbers(value: Any) -> Array:
-    return np.array(ca.DM(value)).ravel(order="F")
 
 
 def turn(axis: Any, angle: float) -> Array:

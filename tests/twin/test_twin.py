@@ -9,14 +9,10 @@ import numpy as np
 import pytest
 
 from supervessel import Twin, reference
-from support import ISS_DG, LAWS, OK, U, body, flying, scene, variant
+from support import ISS_DG, LAWS, OK, STATES, U, body, flying, scene, variant
 from support.marks import FMI
 from twin.flights import MASS_ULPS, SEEDS, STAGE_ULPS, STEPS, flight, groups, rk4, twin_of
 from twin.scenes import numbers, random_inputs, random_scene
-
-STATES = tuple(
-    f"state.{n}[{i}]" for n, k in (("attitude", 4), ("angular_velocity", 3)) for i in range(1, k + 1)
-)
 
 # The FMU and the twin differentiate the same operations and multiply the same partials, in another order: 27
 # terms of up to 12 products, a rounding each, on either side. Nothing is inverted twice: no condition number.
@@ -49,7 +45,7 @@ def test_p_start_holds_the_start_values_of_the_model_description() -> None:
 
 
 def test_x_names_are_the_states_of_the_fmu() -> None:
-    assert twin_of(0).x_names == STATES
+    assert twin_of(0).x_names == tuple(STATES)
 
 
 @pytest.mark.parametrize(

@@ -15,13 +15,13 @@ import pytest
 from fmu_build.errors import BuildError
 from supervessel import Twin, reference
 from supervessel.twin.twin import FUNCTIONS
-from support import ISS_DG, Array, U, body, relative_error, scene, variant
+from support import ISS_DG, TURNING, Array, U, body, relative_error, scene, variant
+from support.processes import ROOT
+from twin.scenes import numbers
 
-ROOT = Path(__file__).parents[2]
 H = 0.5
 STEPS = 20
-RATES = {"angular_velocity": [0.05, -0.08, 0.11], "attitude": [0.5, -0.5, 0.7, 0.1]}
-RAW = variant(ISS_DG, {"rotation": RATES})
+RAW = variant(ISS_DG, {"rotation": TURNING})
 PROPAGATORS = ("rk4", "dop853", "taylor", "split")
 TORQUE = (2e5, -1e5, 3e5)
 
@@ -29,10 +29,6 @@ TORQUE = (2e5, -1e5, 3e5)
 @pytest.fixture(scope="module")
 def twin() -> Twin:
     return Twin(scene(RAW))
-
-
-def numbers(value: Any) -> Array:
-    return np.array(ca.DM(value)).ravel(order="F")
 
 
 # Calls by numbers are checked
@@ -317,7 +313,7 @@ def test_trim_holds_a_spin(law: str) -> None:
     t = Twin(scene(variant(RAW, {"rotation.law": law})))
     u = numbers(t.trim(t.x_start, t.p_start))
     rates = numbers(t.ode(t.x_start, u, t.p_start))[4:]
-    omega = np.array(RATES["angular_velocity"])
+    omega = np.array(TURNING["angular_velocity"])
     # what rounding leaves of two equal torques, solved with a tensor of condition below 2
     assert np.abs(rates).max() <= 64 * U * float(omega @ omega)
     if law == "tensor":

@@ -4,13 +4,13 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import pytest
 
 from supervessel import Twin
 from supervessel.rotation.propagators.free_motion import FIRST_ANGLE, LARGEST_TURN
 from support import ISS_DG, OK, PROPAGATORS, Array, U, body, flying, random_rotation, scene, variant
+from twin.scenes import numbers
 
 RATES = [0.05, -0.08, 0.11]
 OUTPUTS = [*ISS_DG["outputs"]["names"], "principal_moments", "principal_axes", "error_estimate"]
@@ -28,11 +28,6 @@ def assembly(propagator: str, law: str = "tensor") -> dict[str, Any]:
     }
     changes = {"name": f"twin_{propagator}", "rotation": rotation, "outputs.names": OUTPUTS}
     return variant(ISS_DG, changes)
-
-
-def numbers(value: Any) -> Array:
-    """Returns what a CasADi function returned as a flat array."""
-    return np.array(ca.DM(value)).ravel(order="F")
 
 
 def flight(
