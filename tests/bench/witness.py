@@ -26,9 +26,7 @@ from fmu_build.interface.variable_table import variable_table
 from supervessel import Scene, load_scene, parse_scene
 from supervessel.equations import equations
 from support import ISS_DG, body, variant
-from support.costs import station
-
-EXAMPLES = Path(__file__).parents[2] / "examples"
+from support.costs import EXAMPLES, station
 
 FORCES = {
     "vessels.DG.points": {"thruster": {"position": [1.0, 2.0, 3.0]}},

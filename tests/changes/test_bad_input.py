@@ -2,14 +2,13 @@
 
 from collections.abc import Callable
 from ctypes import c_double
-from typing import Any
 
 import numpy as np
 import pytest
 
 from changes.histories import Values, elements
-from changes.test_exchange import TUG
-from fmu.test_saved_state import bytes_of, restore
+from changes.scenes import TUG, brought, lead
+from fmu.saved_states import bytes_of, restore
 from support import DISCARD, EPS, INF, NAN, OK, Instance, variant
 from support.marks import FMI
 
@@ -73,6 +72,10 @@ def step(instance: Instance) -> int:
     return instance.step(0.25)
 
 
+def update(instance: Instance) -> int:
+    return instance.update_discrete_states()
+
+
 def leave_event_mode(instance: Instance) -> int:
     return instance._status(instance.fmu.enterContinuousTimeMode)
 
@@ -98,8 +101,8 @@ JUDGES = [
     ("cs stepping", step, (2, 3)),
     ("cs stepping", read, (3,)),
     ("cs stepping", directional, (3,)),
-    ("events event", Instance.update, (3,)),
-    ("me event", Instance.update, (3,)),
+    ("events event", update, (3,)),
+    ("me event", update, (3,)),
     ("me event", leave_event_mode, (3,)),
     ("me event", read, (2, 3)),
     ("me event", rates, (2, 3)),
@@ -110,27 +113,6 @@ CASES = pytest.mark.parametrize(
     [(place, judge, fmi) for place, judge, versions in JUDGES for fmi in versions],
     ids=lambda value: getattr(value, "__name__", str(value)),
 )
-
-
-def brought(place: str, fmi: int, raw: dict[str, Any] = YARD) -> Instance:
-    """Returns an instance at a place of its life, on its way for a while."""
-    interface, mode = place.split()
-    options = {"eventModeUsed": True} if interface == "events" else {}
-    return lead(Instance(raw, fmi, exchange=interface == "me", **options), interface, mode)
-
-
-def lead(instance: Instance, interface: str, mode: str) -> Instance:
-    assert instance.enter() == OK
-    if mode != "initialising":
-        assert instance.exit() == OK
-    if mode == "stepping":
-        assert instance.step(0.5) == OK
-    if interface == "me" and mode != "initialising":
-        assert instance.run() == OK
-        if mode == "event":
-            assert instance._status(instance.fmu.enterEventMode) == OK
-    instance.log.clear()
-    return instance
 
 
 def held(instance: Instance) -> list[float]:
@@ -157,7 +139,7 @@ def test_what_cannot_be_is_discarded_by_name_and_the_same_call_works_after(place
             name in wrong for name in ("held.docked", "again.docked", "stowed.docked", "grip.docked")
         ):
             continue
-        instance = brought(place, fmi)
+        instance = brought(place, fmi, YARD)
         refused(instance, judge, wrong, words if not moving else words[:3])
         instance.free()
 
@@ -165,7 +147,7 @@ def test_what_cannot_be_is_discarded_by_name_and_the_same_call_works_after(place
 @pytest.mark.parametrize("kind", BAD)
 def test_a_refusal_stays_one_after_reset_and_in_a_restored_state(kind):
     wrong, words = BAD[kind]
-    first = brought("cs stepping", 3)
+    first = brought("cs stepping", 3, YARD)
     assert first.set(wrong) == OK
     content = bytes_of(first)
     other = Instance(YARD)
@@ -185,7 +167,7 @@ def test_a_pending_change_goes_with_a_serialised_state():
     coming = (
         AT_CONTACT | elements("stowed.velocity", (0.1, -0.2, 0.3)) | elements("stowed.rate", (0.1, 0.2, 0))
     )
-    first, other = brought("cs stepping", 3), Instance(YARD)
+    first, other = brought("cs stepping", 3, YARD), Instance(YARD)
     assert first.set(coming) == OK
     assert restore(other, bytes_of(first)) == OK
     other.time = first.time
@@ -201,14 +183,14 @@ def test_a_pending_change_goes_with_a_serialised_state():
 def test_a_docking_that_leaves_no_finite_rate_names_the_dock(place, judge, fmi):
     if "initialising" in place or "continuous" in place:
         return  # docks are closed at the start, and stay as they are in continuous time
-    instance = brought(place, fmi)
+    instance = brought(place, fmi, YARD)
     refused(instance, judge, AT_CONTACT, "stowed.docked = true with this motion leaves angular_velocity = (")
     instance.free()
 
 
 @FMI
 def test_a_docking_at_a_rate_that_no_step_can_follow_is_discarded(fmi):
-    instance = brought("cs stepping", fmi)
+    instance = brought("cs stepping", fmi, YARD)
     refused(instance, step, AT_CONTACT | elements("stowed.velocity", (1e300, 0.0, 0.0)), "sub-steps")
     instance.free()
 
@@ -219,7 +201,7 @@ def test_a_docking_at_a_rate_that_no_step_can_follow_is_discarded(fmi):
     "name", ["stowed.velocity[1]", "stowed.rate[3]", "tug.arm.velocity[2]", "tug.arm.rate[1]"]
 )
 def test_a_motion_that_is_no_number_is_not_stored(name, value, fmi):
-    instance = brought("cs stepping", fmi)
+    instance = brought("cs stepping", fmi, YARD)
     assert instance.set({"tank.mass": 1.0, name: value}) == DISCARD
     assert f"{name} = " in instance.messages()[-1]
     assert "must be finite" in instance.messages()[-1]

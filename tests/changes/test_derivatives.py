@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from changes.histories import EVENTS, Array, Values, assembly, elements, start_values
-from changes.test_exchange import EVENTS as TUG_EVENTS
-from changes.test_exchange import TUG
+from changes.scenes import TUG, TUG_EVENTS
 from support import EPS, OK, Instance, scene, variant
 
 OF_VESSELS = ("origin", "centre_of_mass", "attitude", "angular_velocity", "angular_momentum")

@@ -1,40 +1,16 @@
 """A ship docks at the side of a station: rates after it, energy, and what it must not be."""
 
-from typing import Any
-
 import hypothesis.strategies as st
 import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 
 from changes.histories import ByExchange, ByFmu, ByTwin, Driver, Values, elements
+from changes.scenes import MIR
 from supervessel import reference
-from support import DISCARD, EPS, ISS_DG, OK, Instance, scene
+from support import DISCARD, EPS, OK, Instance, scene
 from support.marks import FMI
 
-# The station and the ship of Orbiter, converted to right-handed axes.
-MIR: dict[str, Any] = {
-    "name": "mir_dg",
-    "root": "Mir",
-    "vessels": {
-        "Mir": {
-            "mass": 124340.0,
-            "pmi": [86.1, 79.6, 37.0],
-            "ports": {
-                "side": {"position": [15.8, 0.12, -9.5], "direction": [1, 0, 0], "alignment": [0, 1, 0]},
-                "fore": {"position": [0.0, 0.12, -10.74], "direction": [0, 0, -1], "alignment": [0, 1, 0]},
-            },
-        },
-        "DG": ISS_DG["vessels"]["DG"],
-    },
-    "docks": [
-        {"ports": ["Mir.side", "DG.nose"], "name": "berth", "docked": False},
-        {"ports": ["DG.nose", "Mir.fore"], "name": "front", "docked": False},
-    ],
-    "inputs": {"docked": ["berth", "front"]},
-    "rotation": {"propagator": "dop853", "angular_velocity": [0.01, -0.02, 0.03], "attitude": [3, 1, -2, 5]},
-    "outputs": {"names": ["mass", "inertia", "angular_velocity", "attitude", "kinetic_energy"]},
-}
 MIR_RATE = np.array(MIR["rotation"]["angular_velocity"])
 FREE = {"berth.docked": 0.0, "front.docked": 0.0}
 

@@ -15,10 +15,9 @@ from changes.histories import (
     legal,
     start_values,
 )
-from changes.test_bad_input import brought
-from changes.test_exchange import DURATION, MIXED, STEADY, TUG, drawn_in
-from fmu.test_intermediate_update import Listener
-from fmu.test_saved_state import bytes_of, restore
+from changes.scenes import DURATION, MIXED, STEADY, TUG, brought, drawn_in
+from fmu.listeners import Listener
+from fmu.saved_states import bytes_of, restore
 from support import DISCARD, EPS, OK, Instance, scene, variant
 from support.marks import FMI
 

@@ -8,62 +8,13 @@ from fmpy.fmi1 import FMICallException
 from scipy.integrate import solve_ivp
 
 from changes.histories import ByEvents, ByExchange, ByFmu, Values, elements, start_values
+from changes.scenes import DURATION, MIXED, STEADY, TORQUE, TUG, TUG_EVENTS, drawn_in
 from supervessel import reference
 from support import DISCARD, EPS, ERROR, OK, Instance, scene, variant
 from support.marks import FMI
 
-# A tug with a tank on an arm that an importer may drive.
-TUG: dict[str, Any] = {
-    "name": "tug",
-    "root": "tug",
-    "vessels": {
-        "tug": {
-            "mass": 900.0,
-            "pmi": [2.0, 3.0, 4.0],
-            "ports": {
-                "arm": {"position": [3.0, 0.5, 0.0], "direction": [1, 0, 0], "alignment": [0, 1, 0]},
-                "top": {"position": [0.0, 0.0, 2.0], "direction": [0, 0, 1], "alignment": [0, 1, 0]},
-            },
-        },
-        "tank": {
-            "mass": 400.0,
-            "pmi": [0.5, 0.75, 1.0],
-            "ports": {
-                "end": {"position": [1.0, 0.0, 0.2], "direction": [1, 0, 0], "alignment": [0, 1, 0]},
-                "far": {"position": [-1.0, 0.0, 0.0], "direction": [-1, 0, 0], "alignment": [0, 1, 0]},
-            },
-        },
-    },
-    "docks": [
-        {"ports": ["tug.arm", "tank.end"], "name": "held"},
-        {"ports": ["tug.top", "tank.far"], "name": "stowed", "docked": False},
-    ],
-    "inputs": {"mass": ["tank"], "pose": ["tug.arm"], "docked": ["held", "stowed"], "torque": True},
-    "rotation": {
-        "propagator": "dop853",
-        "tolerance": 1e-12,
-        "mass_change": "momentum",
-        "pose_change": "momentum",
-        "angular_velocity": [0.2, -0.3, 0.1],
-        "attitude": [3, 1, -2, 5],
-    },
-    "outputs": {"names": ["mass", "inertia", "angular_velocity", "attitude", "angular_momentum"]},
-}
-MIXED = variant(TUG, {"name": "mixed", "rotation.mass_change": "rate"})
-STEADY = variant(TUG, {"name": "steady", "rotation.mass_change": "rate", "rotation.pose_change": "rate"})
-
-TORQUE = elements("torque", (30.0, -20.0, 10.0))
-DURATION = 4.0  # s
 FLIGHT_ERROR = 1e-10
 """Of DOP853 at rtol = 1e-13 on both sides, over a radian."""
-
-
-def drawn_in(time: float) -> Values:
-    """Returns inputs that move all the time: the tank is drawn in, turned and filled."""
-    share = time / DURATION
-    pose = elements("tug.arm.position", (3.0 - share, 0.5 + share, 0.4 * np.sin(3.0 * share)))
-    pose |= elements("tug.arm.direction", (1.0, 0.3 * share, 0.0))
-    return pose | TORQUE | {"tank.mass": 400.0 + 200.0 * share**2}
 
 
 def by_scipy(raw: dict[str, Any], by_momentum: bool) -> np.ndarray:
@@ -116,22 +67,12 @@ def test_inputs_that_step_in_continuous_time_change_the_rate_at_once(fmi):
     assert np.abs(driver.angular_velocity - omega).max() <= CHANGE_ERROR * np.abs(omega).max()
 
 
-EVENTS: list[Values] = [
-    drawn_in(DURATION / 2),
-    drawn_in(DURATION)
-    | {"held.docked": 0.0, "stowed.docked": 1.0}
-    | elements("stowed.velocity", (0.1, -0.2, 0.3))
-    | elements("stowed.rate", (0.2, 0.1, -0.1)),
-    {"stowed.docked": 0.0},
-]
-
-
 @pytest.mark.parametrize(("driver", "fmi"), [(ByExchange, 2), (ByExchange, 3), (ByEvents, 3)])
 @pytest.mark.parametrize("raw", [TUG, MIXED, STEADY], ids=["momentum", "mixed", "rate"])
 def test_events_at_one_instant_follow_each_other(raw, driver, fmi):
     flying, flown = driver(raw, fmi), scene(raw)
     values, omega = start_values(flown), np.array(flown.rotation.angular_velocity)
-    for inputs in EVENTS:
+    for inputs in TUG_EVENTS:
         flying.set(inputs)
         omega = reference.change(flown, omega, values, values | inputs)
         values |= inputs
@@ -143,7 +84,7 @@ def test_changes_between_two_steps_are_one_change():
     driver, flown = ByFmu(MIXED), scene(MIXED)
     start = start_values(flown)
     values = dict(start)
-    for inputs in EVENTS:
+    for inputs in TUG_EVENTS:
         driver.set(inputs)
         values |= inputs
         omega = reference.change(flown, flown.rotation.angular_velocity, start, values)

@@ -47,7 +47,7 @@ def brought(fmi: int, place: str, raw: Any = DOCKING) -> Instance:
     if state not in ("instantiated", "initialising"):
         assert instance.exit() == OK
     if interface == "events" and state == "stepping":
-        assert instance.update() == OK
+        assert instance.update_discrete_states() == OK
         assert instance._status(instance.fmu.enterStepMode) == OK
     if interface == "me" and state == "continuous":
         assert instance.run() == OK
@@ -203,12 +203,12 @@ def test_a_boolean_is_no_known_of_a_derivative(fmi):
 
 def test_co_simulation_goes_from_initialisation_through_event_mode_to_steps_and_back():
     instance = brought(3, "events, event")
-    assert instance.update() == OK
+    assert instance.update_discrete_states() == OK
     assert instance._status(instance.fmu.enterStepMode) == OK
     assert instance.step(0.5) == OK
     assert instance._status(instance.fmu.enterEventMode) == OK
     assert instance.set({"berth.docked": False}) == OK
-    assert instance.update() == OK
+    assert instance.update_discrete_states() == OK
     assert instance._status(instance.fmu.enterStepMode) == OK
     assert instance.fmu.doStep(0.5, 0.5) == (False, False, False, 1.0)
     assert instance.get("mass") == ISS

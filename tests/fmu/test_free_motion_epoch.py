@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fmu.flights import FREE, TORQUE, angle, assembly, error, fly, state, tilted
+from fmu.saved_states import bytes_of
 from supervessel.equations import equations, p_start
 from support import DISCARD, OK, Instance, U, flying, scene
 from support.marks import FMI
@@ -56,13 +57,6 @@ def test_tiny_steps_late_in_a_flight_are_not_lost():
     assert abs(end[0] - q[0]) + abs(end[3] - q[1]) <= rounding
 
 
-def saved_bytes(instance: Instance) -> bytes:
-    saved = instance.fmu.getFMUState()
-    content = bytes(instance.fmu.serializeFMUState(saved))
-    instance.fmu.freeFMUState(saved)
-    return content
-
-
 @pytest.mark.parametrize("count", [1, 2, 77])
 @pytest.mark.parametrize("propagator", FREE)
 @FMI
@@ -71,7 +65,7 @@ def test_the_epoch_is_part_of_a_saved_state(fmi, propagator, count):
     with flying(raw, fmi) as instance:
         fly(instance, 0.1, count)
         saved = instance.fmu.getFMUState()
-        content, time = saved_bytes(instance), instance.time
+        content, time = bytes_of(instance), instance.time
         fly(instance, 0.1, 50)
         end = instance.bits()
         instance.fmu.setFMUState(saved)
@@ -108,9 +102,9 @@ def test_constants_of_an_epoch_are_found_by_the_second_step_from_it_alone():
             assert instance.set({"torque": [torque, 0.0, 0.0]}) == OK
             found = constants_of(instance, raw)
             fly(instance, 0.1)
-            assert found not in saved_bytes(instance)
+            assert found not in bytes_of(instance)
         fly(instance, 0.1)
-        assert found in saved_bytes(instance)
+        assert found in bytes_of(instance)
 
 
 def test_a_flight_from_the_same_state_without_its_epoch_has_other_bits():

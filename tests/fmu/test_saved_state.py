@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fmu.saved_states import bytes_of, function, restore, save
 from support import DISCARD, ERROR, ISS_DG, OK, TURNING, Instance, body, draw_inputs, variant
 from support.marks import FMI, KIND
 
@@ -93,45 +94,6 @@ def go_on(instance: Instance, exchange: bool, moment: str) -> list[Any]:
         answers.append(instance.set(draw(seed)))
         advance(instance, seed)
     return [*answers, instance.bits()]
-
-
-def save(instance: Instance) -> Any:
-    return instance.fmu.getFMUState()
-
-
-def bytes_of(instance: Instance) -> bytes:
-    """Returns the instance's state as bytes."""
-    state = save(instance)
-    result = bytes(instance.fmu.serializeFMUState(state))
-    instance.fmu.freeFMUState(state)
-    return result
-
-
-def restore(instance: Instance, content: bytes) -> int:
-    """Gives an instance the state that bytes hold; returns the first status that is not OK."""
-    state = c_void_p()
-    size = len(content)
-    buffer = (c_ubyte * max(size, 1)).from_buffer_copy(content or b"\0")
-    status = deserialize(instance, buffer, size, byref(state))
-    if status == OK:
-        status = instance._status(instance.fmu.setFMUState, state)
-        instance.fmu.freeFMUState(state)
-    else:
-        assert state.value is None
-    return status
-
-
-def function(instance: Instance, name: str) -> Any:
-    """Returns a C function by its name in FMI 3.0."""
-    if instance.fmi == 2:
-        name = name.replace("FMUState", "FMUstate").replace("Deserialize", "DeSerialize")
-    return instance.fmu._functions[f"fmi{instance.fmi}{name}"]
-
-
-def deserialize(instance: Instance, content: Any, size: int, state: Any) -> int:
-    call = function(instance, "DeserializeFMUState")
-    argument = content and cast(content, call.argtypes[1])
-    return int(call(instance.fmu.component, argument, size, state))
 
 
 # Restored.

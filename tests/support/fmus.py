@@ -163,9 +163,9 @@ class Instance:
 
     def run(self) -> int:
         """Takes an initialised instance of model exchange on to continuous-time mode."""
-        return self.update() or self._status(self.fmu.enterContinuousTimeMode)
+        return self.update_discrete_states() or self._status(self.fmu.enterContinuousTimeMode)
 
-    def update(self) -> int:
+    def update_discrete_states(self) -> int:
         """Updates discrete states in event mode."""
         return self._status(self.fmu.updateDiscreteStates if self.fmi == 3 else self.fmu.newDiscreteStates)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from changes.histories import ByFmu, ByTwin, Values
-from changes.test_docking import MIR
+from changes.scenes import MIR
 from supervessel import Twin
 from support import DISCARD, EPS, Instance, scene, variant
 from twin.scenes import numbers

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from changes.test_docking import MIR
+from changes.scenes import MIR
 from fmu_build import BuildError
 from fmu_build.generate.model import generate
 from fmu_build.generate.sources import LAYER

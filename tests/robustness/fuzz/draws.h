@@ -26,7 +26,7 @@ static double uniform(double low, double high) {
 /* A torque [N m] under which a step begins and is refused after some sub-steps. */
 static const double SPINNING_UP = 2e18;
 
-/* None is such that a step would need millions of sub-steps and yet be taken. */
+/* No odd number makes a step need millions of sub-steps and yet be taken. */
 static double odd_number(void) {
     static const double odd[] = {0.0,    -0.0,  1.0,    -1.0,  5e-324, -1e-310,  DBL_MIN, 1e-200,
                                  1e-150, 1e150, -1e150, 1e200, 1e308,  -DBL_MAX, 0.1,     DBL_EPSILON};
@@ -57,7 +57,7 @@ static bool is_boolean(unsigned reference) {
 #endif
 }
 
-/* Of a number. */
+/* The reference of some number of a role. */
 static unsigned reference_of(Role role) {
     unsigned reference = below(VARIABLE_COUNT);
     while (VARIABLES[reference].role != role || is_boolean(reference)) reference = (reference + 1) % VARIABLE_COUNT;
