@@ -70,8 +70,13 @@ def variant(raw: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any
         if value is None:
             del table[key]
         else:
-            table[key] = value
+            table[key] = _tables(value)
     return new
+
+
+def _tables(value: Any) -> Any:
+    """Returns a value whose tables are its own, so that later changes leave the given one as it is."""
+    return {key: _tables(part) for key, part in value.items()} if isinstance(value, dict) else value
 
 
 def draw_inputs(generator: np.random.Generator) -> dict[str, Any]:
