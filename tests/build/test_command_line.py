@@ -14,7 +14,7 @@ from fmpy import read_model_description
 from supervessel.problems import printable
 from support import BALL
 from support.compilers import fake_compiler
-from support.processes import ROOT, needs_posix
+from support.processes import ROOT, names_in, needs_posix
 
 BROKEN = BALL.replace("mass = 2.0", "mass = -2.0").replace('root = "B"', 'root = "C"') + "colour = 3\n"
 
@@ -50,10 +50,6 @@ def run(folder, *arguments, **environment):
     )
 
 
-def files(folder):
-    return sorted(path.name for path in folder.iterdir())
-
-
 def assert_failed(done, *lines):
     """Asserts that a run ended with status 1, these lines on stderr and nothing on stdout."""
     assert done.stderr.splitlines() == list(lines)
@@ -64,14 +60,14 @@ def test_success_prints_the_path_and_nothing_else(folder):
     (folder / "out").mkdir()
     done = run(folder, "ball.toml", "-o", "out/my.fmu")
     assert (done.returncode, done.stdout, done.stderr) == (0, f"{Path('out/my.fmu')}\n", "")
-    assert files(folder / "out") == ["my.fmu"]
+    assert names_in(folder / "out") == ["my.fmu"]
 
 
 def test_the_default_output_is_the_scene_name_in_the_current_folder(folder):
     elsewhere = folder / "elsewhere"
     elsewhere.mkdir()
     done = run(elsewhere, "../ball.toml")
-    assert (done.stdout, files(elsewhere)) == ("ball.fmu\n", ["ball.fmu"])
+    assert (done.stdout, names_in(elsewhere)) == ("ball.fmu\n", ["ball.fmu"])
 
 
 @pytest.mark.parametrize(("options", "version"), [((), "3.0"), (("--fmi", "2"), "2.0")])
@@ -101,7 +97,7 @@ def test_help_is_a_result_on_stdout(folder):
 def test_wrong_usage_ends_with_status_2_and_builds_nothing(folder, arguments, complaint):
     done = run(folder, *arguments)
     assert complaint in done.stderr
-    assert (done.returncode, done.stdout, files(folder)) == (2, "", ["ball.toml"])
+    assert (done.returncode, done.stdout, names_in(folder)) == (2, "", ["ball.toml"])
 
 
 def test_every_problem_of_a_scene_is_a_line_on_stderr(folder):
@@ -192,7 +188,7 @@ def test_a_full_temporary_folder_is_a_failure_without_traceback(folder):
     command = f"ulimit -f 1 && exec {sys.executable} -m fmu_build ball.toml"
     done = subprocess.run(["sh", "-c", command], cwd=folder, capture_output=True, text=True, check=False)
     assert "Traceback" not in done.stderr
-    assert (done.returncode, done.stdout, files(folder)) == (1, "", ["ball.toml"])
+    assert (done.returncode, done.stdout, names_in(folder)) == (1, "", ["ball.toml"])
 
 
 @needs_posix
@@ -202,7 +198,7 @@ def test_a_compiler_that_fails_is_quoted_on_stderr(folder, tmp_path_factory):
     assert "error: no disk, no ink" in done.stderr
     assert done.stderr.splitlines()[-1].startswith("The compiler's cache is ")
     assert "Traceback" not in done.stderr
-    assert (done.returncode, done.stdout, files(folder)) == (1, "", ["ball.toml"])
+    assert (done.returncode, done.stdout, names_in(folder)) == (1, "", ["ball.toml"])
 
 
 def an_fmu(file):
@@ -230,16 +226,16 @@ def test_an_old_fmu_survives_a_build_that_fails(folder, reason, tmp_path_factory
         environment["PYTHONPATH"] = failing(tmp_path_factory)
     else:
         environment["SUPERVESSEL_CACHE"] = folder / "ball.toml"
-    before = files(folder)
+    before = names_in(folder)
     done = run(folder, "ball.toml", **environment)
     assert "Traceback" not in done.stderr
-    assert (done.returncode, output.read_bytes(), files(folder)) == (1, old, before)
+    assert (done.returncode, output.read_bytes(), names_in(folder)) == (1, old, before)
 
 
 def test_a_build_replaces_an_old_fmu(folder):
     an_fmu(folder / "ball.fmu")
     assert run(folder, "ball.toml").returncode == 0
-    assert files(folder) == ["ball.fmu", "ball.toml"]
+    assert names_in(folder) == ["ball.fmu", "ball.toml"]
     assert read_model_description(str(folder / "ball.fmu")).modelName == "ball"
 
 
@@ -267,13 +263,13 @@ def homeless(tmp_path_factory):
 def test_a_build_works_with_a_home_that_cannot_be_written(homeless):
     done, folder, _ = homeless
     assert (done.returncode, done.stdout, done.stderr) == (0, "ball.fmu\n", "")
-    assert files(folder) == ["ball.fmu", "ball.toml"]
+    assert names_in(folder) == ["ball.fmu", "ball.toml"]
 
 
 @needs_linux
 def test_a_build_leaves_nothing_in_the_temporary_folder(homeless):
     _, _, temporary = homeless
-    assert files(temporary) == []
+    assert names_in(temporary) == []
 
 
 @needs_linux

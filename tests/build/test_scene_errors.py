@@ -26,7 +26,6 @@ from support.refusals import (
 
 ROWS = "must be three rows of three finite numbers"
 NAMES = "must be a list of names in quotes"
-
 NOT_DOCKED = "inputs.pose: DG.nose is not docked; its pose would change nothing"
 
 MISSING = [

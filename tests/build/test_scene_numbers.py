@@ -22,7 +22,6 @@ from support.refusals import (
 )
 
 HUGE = "an integer of 333 hexadecimal digits"
-
 TOLERANCES = "must be a number from 1e-15 to 0.1"
 POSITIVE = "must be a finite number > 0"
 

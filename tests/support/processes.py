@@ -106,6 +106,11 @@ def kept_in(cache: Path) -> Path:
     return Path(os.path.realpath(cache), OURS, "generation-1")
 
 
+def names_in(folder: Path) -> list[str]:
+    """Returns the names of what lies in a folder, sorted."""
+    return sorted(path.name for path in folder.iterdir())
+
+
 def run(command: Sequence[str], folder: Path, cache: Path) -> subprocess.CompletedProcess[str]:
     """Returns what came of a command in a folder."""
     return subprocess.run(

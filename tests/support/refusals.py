@@ -15,16 +15,13 @@ CUBE = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 DOCK = {"ports": ["ISS.P2", "DG.nose"]}
 
 NUMBER = "must be a finite number >= 0"
-
 THREE = "must be three finite numbers"
 MOMENTS = "must be three finite numbers >= 0"
 DIRECTION = "must be three finite numbers, a direction of any length > 0"
-
 BOUNDS = "must be two finite numbers [low, high]"
 KNOWN_LAWS = "must be one of none, decoupled, principal, tensor"
 NO_BODY = "no rigid body has these moments"
 ONE_PORT = 'must be a port, written "vessel.port"'
-
 UNREACHED = "is not reached from the root ISS by docks"
 
 

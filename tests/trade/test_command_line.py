@@ -8,7 +8,7 @@ import pytest
 
 from fmu_build.trade import table
 from support import processes
-from support.processes import kept_in, needs_posix, run
+from support.processes import kept_in, names_in, needs_posix, run
 from support.scenes import BALL, EXPERIMENT
 from support.signals import KEPT
 
@@ -21,10 +21,6 @@ def command(*arguments):
     return [sys.executable, "-m", "supervessel", "trade", *map(str, arguments)]
 
 
-def files(folder):
-    return sorted(path.name for path in folder.iterdir())
-
-
 @pytest.fixture(scope="module")
 def interrupted(tmp_path_factory, cache):
     """A trade interrupted when it has its first results: its end, what is there, and what it has kept."""
@@ -32,7 +28,7 @@ def interrupted(tmp_path_factory, cache):
     (folder / "ball.toml").write_text(SCENE)
     words = command("ball.toml", "--quick", "-o", "out")
     done, kept = processes.interrupted(words, folder, cache, "trade")
-    return done, files(folder), kept
+    return done, names_in(folder), kept
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +62,7 @@ def test_the_same_command_goes_on_from_what_was_kept(interrupted, finished, cach
 def test_tables_are_printed_and_all_is_in_the_folder(finished):
     done, folder = finished
     assert (done.returncode, done.stderr) == (0, "")
-    assert files(folder / "out") == FILES
+    assert names_in(folder / "out") == FILES
     found = json.loads((folder / "out" / "trade.json").read_text())
     assert done.stdout == f"{table(found)}\n\nout\n"
     assert (folder / "out" / "trade.md").read_text() == f"{table(found)}\n"
@@ -143,7 +139,7 @@ def test_a_full_disk_leaves_no_new_folder(finished, cache):
 def test_what_cannot_be_done_is_said_before_any_work(tmp_path, change, arguments, status, message):
     (tmp_path / "ball.toml").write_text(SCENE.replace(*change))
     done = run(command("ball.toml", *arguments), tmp_path, tmp_path / "cache")
-    assert files(tmp_path) == ["ball.toml"]
+    assert names_in(tmp_path) == ["ball.toml"]
     assert (done.returncode, done.stdout) == (status, "")
     assert done.stderr.endswith(message)
     assert "Traceback" not in done.stderr
