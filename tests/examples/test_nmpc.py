@@ -11,8 +11,8 @@ import pytest
 
 from fmu_build import build_fmu
 from supervessel import Twin, load_scene
-from support.pages import text
 from support import U
+from support.pages import text
 
 ROOT = Path(__file__).parents[2]
 sys.path += [str(ROOT / "examples"), str(ROOT / "tests" / "bench")]

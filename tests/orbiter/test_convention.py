@@ -8,8 +8,8 @@ import pytest
 from orbiter.points import scene_pmi
 from supervessel import SceneError, Twin, parse_scene, reference
 from support import ISS_DG, OK, flying, relative_error, scene, variant
-from support.pages import text
 from support.marks import FMI
+from support.pages import text
 from support.processes import ROOT
 
 AGREEMENT = 1e-13

@@ -22,8 +22,7 @@ from fmu_build.compile.compiler import FLAGS, TRIAL_FLAGS, compile_library
 from fmu_build.platforms import host_platform
 from fmu_build.storage.cache import OURS, cache_folder
 from fmu_build.storage.compiler_files import FOLDER, MANIFESTS, RECORD, UNFINISHED, compiler_folder
-
-ROOT = Path(__file__).parents[2]
+from support.pages import ROOT
 
 needs_posix = pytest.mark.skipif(os.name != "posix", reason="needs signals and ulimit")
 
