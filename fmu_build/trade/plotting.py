@@ -11,11 +11,11 @@ from typing import Any
 from fmu_build.compile.compiler import package_places
 from fmu_build.flight.choices import label
 from fmu_build.flight.flying import surroundings_of_python
-from fmu_build.storage.cache import folder_for, keep_bytes, read_bytes
-from fmu_build.storage.temporary import temporary_folder
+from fmu_build.storage.cache import folder_for, keep_bytes, read_bytes, reason
+from fmu_build.storage.temporary import place_for_temporary, temporary_folder
 from fmu_build.trade.draw import KINDS
 from fmu_build.trade.table import settings_of
-from supervessel.problems import TradeError
+from supervessel.problems import TradeError, printable
 from supervessel.rotation.propagators import PROPAGATORS
 from supervessel.shell.processes import run
 
@@ -42,11 +42,15 @@ def plot(trade: Mapping[str, Any]) -> dict[str, bytes]:
     path = package_places()
     if PathFinder.find_spec("matplotlib", path) is None:
         raise ImportError("matplotlib")
-    with temporary_folder() as folder:
-        job = {"path": path, "figure": figure(trade)}
-        (folder / "figure.json").write_text(json.dumps(job), encoding="utf-8")
-        _run(folder)
-        return {kind: (folder / f"plot.{kind}").read_bytes() for kind in KINDS}
+    job = {"path": path, "figure": figure(trade)}
+    try:
+        with temporary_folder() as folder:
+            (folder / "figure.json").write_text(json.dumps(job), encoding="utf-8")
+            _run(folder)
+            return {kind: (folder / f"plot.{kind}").read_bytes() for kind in KINDS}
+    except OSError as error:
+        place = error.filename or place_for_temporary()
+        raise TradeError(f"{printable(str(place))}: {reason(error, 'to draw in')}") from None
 
 
 def _run(folder: Path) -> None:
