@@ -12,6 +12,7 @@ from fmu_build import BuildError
 from fmu_build.compile.compiler import compile_library
 from fmu_build.platforms import host_platform
 from fmu_build.storage.cache import cache_folder
+from fmu_build.storage.compiler_files import compiler_folder
 from support import BALL
 from support.compilers import fake_compiler
 from support.processes import ROOT, cache, needs_posix
@@ -56,7 +57,7 @@ def test_a_compiler_gets_two_variables_and_no_other(tmp_path, monkeypatch):
         compile_library([tmp_path / "any.c"], host_platform(), tmp_path / "any.so")
     variables = dict(line.split("=", 1) for line in heard.read_text().split("\0") if line)
     assert variables.keys() == {"ZIG_GLOBAL_CACHE_DIR", "ZIG_LOCAL_CACHE_DIR"}
-    assert variables["ZIG_GLOBAL_CACHE_DIR"] == str(cache_folder())
+    assert variables["ZIG_GLOBAL_CACHE_DIR"] == str(compiler_folder())
     objects = Path(variables["ZIG_LOCAL_CACHE_DIR"])
     assert objects.is_relative_to(cache_folder())  # a folder of this compilation alone
     assert not objects.exists()

@@ -75,7 +75,7 @@ def test_temporary_files_on_a_full_disk_are_told_in_words(place, small, words):
     right_or_refused(done, place, words)
 
 
-@pytest.mark.parametrize("small", ["size=4k", "size=64k", "ro", "nr_inodes=2"], indirect=True)
+@pytest.mark.parametrize("small", ["size=4k", "size=64k", "ro", "nr_inodes=1"], indirect=True)
 @pytest.mark.parametrize("words", [BUILD, IMPORT], ids=["build", "import"])
 def test_an_output_on_a_full_disk_is_told_in_a_line_and_leaves_nothing(place, small, words):
     output = small / "out"
