@@ -1,10 +1,9 @@
-/* The variable table of a scene. The table itself is generated (scene.c); this is its form. */
+/* The variable table of a scene, and getting and setting by it. The table itself is generated (scene.c). Values live in
+   now.values, by value reference; what is set is judged where it is first used (composite.c). */
 #ifndef VARIABLES_H
 #define VARIABLES_H
 
-#include <stddef.h>
-
-#include "scene.h"
+#include "instance.h"
 
 typedef enum { TYPE_NUMBER, TYPE_BOOLEAN } Type;
 
@@ -35,12 +34,9 @@ typedef struct {
     double nominal;
     Role role;
     unsigned follows;
-#if DOCK_COUNT
     Type type; /* the values of a Boolean are 0 and 1 */
-#endif
 } Variable;
 
-/* Indexed by value reference: time, inputs (p, then torque), parameters, outputs, states, derivatives. */
 /* A check and the value reference at which it stands; the last one is CHECK_NONE. */
 typedef struct {
     unsigned reference;
@@ -48,8 +44,40 @@ typedef struct {
 } Judged;
 
 extern const Judged JUDGED[];
+
+/* Indexed by value reference: time, inputs (p, then torque), parameters, outputs, states, derivatives. */
 extern const Variable VARIABLES[VARIABLE_COUNT];
 
 extern const char MODEL_TOKEN[];
+
+/* Gets or sets values by value reference, all of them or none. */
+Status instance_get(Instance *instance, const unsigned references[], size_t count, double values[]);
+Status instance_set(Instance *instance, const unsigned references[], size_t count, const double values[]);
+
+/* Whether references are of the table. */
+Status instance_check_references(Instance *instance, const unsigned references[], size_t count);
+
+/* Refuses a reference that is not. */
+Status instance_unknown_reference(Instance *instance, unsigned reference);
+
+static inline bool is_boolean(unsigned reference) {
+    return DOCK_COUNT > 0 && VARIABLES[reference].type == TYPE_BOOLEAN;
+}
+
+/* Whether the state has an attitude that can be brought to unit length; a solver may have lost it. */
+Status instance_check_attitude(Instance *instance);
+
+/* Continuous states of model exchange, in the order of the table. */
+Status instance_set_time(Instance *instance, double time);
+Status instance_get_states(Instance *instance, double states[], size_t count);
+Status instance_set_states(Instance *instance, const double states[], size_t count);
+Status instance_get_rates(Instance *instance, double rates[], size_t count);
+Status instance_get_nominals(Instance *instance, double nominals[], size_t count);
+
+/* Whether products of a few of these numbers are doubles. */
+bool are_ordinary(const double numbers[], size_t count);
+
+/* Whether all that follows from states, inputs and composite surely is within the range of doubles. */
+bool instance_is_ordinary(Instance *instance);
 
 #endif

@@ -7,6 +7,7 @@ from fmu_build.document.licences import licence_files
 from fmu_build.document.page import page
 from fmu_build.interface.terminals import terminal_icons
 from fmu_build.interface.variable_table import TableEntry
+from fmu_build.versions import VERSIONS
 from supervessel.drawing.drawing import drawing, icon
 from supervessel.drawing.figure import svg
 from supervessel.drawing.geometry import assembly
@@ -38,6 +39,6 @@ def documentation(
         "terminalsAndIcons/icon.svg": svg(symbol).encode(),
         "terminalsAndIcons/icon.png": symbol_png,
     }
-    if fmi == 2:
-        files["model.png"] = symbol_png
+    if VERSIONS[fmi].icon:
+        files[VERSIONS[fmi].icon] = symbol_png
     return files | licence_files(fmi) | terminal_icons(scene, entries)

@@ -1,4 +1,4 @@
-"""C tables of the composite of many moving vessels, which a loop in C puts together: fmu_build/c/loop.c."""
+"""C tables of the composite of many moving vessels, which fmu_build/c/vessel_loop.c puts together."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -150,7 +150,7 @@ def _fill_up(tables: Tables) -> None:
 
 
 def _pose_at(frame: int) -> int:
-    """Returns where the pose of a frame stands; see `pose_at` in loop.c."""
+    """Returns where the pose of a frame stands; see `pose_at` in vessel_loop.c."""
     block, lane = divmod(frame + LANES - 1, LANES)
     return 12 * LANES * block + lane
 
@@ -232,9 +232,8 @@ def loop_functions(model: Equations) -> list[ca.Function]:
 def loop_constants(tables: Tables | None) -> dict[str, int]:
     """Returns what the C layer must know of a loop, by name of the macro."""
     if tables is None:
-        return {"LOOP": 0}
+        return {}
     return {
-        "LOOP": 1,
         "LOOP_LANES": LANES,
         "LOOP_BLOCK": LANES,
         "LOOP_FRAME_COUNT": len(tables.frames),
@@ -249,7 +248,7 @@ def loop_source(tables: Tables | None) -> str:
         return ""
     bodies = _body_rows(tables)
     return (
-        '\n#include "loop.h"\n\n'
+        '\n#include "vessel_loop.h"\n\n'
         + _array("LoopFrame LOOP_FRAMES", tables.frames)
         + _array("LoopBody LOOP_BODIES", bodies)
         + _array("double LOOP_HELD", [repr(number) for number in tables.held])

@@ -1,12 +1,15 @@
+/* The composite of a scene of many moving vessels, and its derivatives, by a loop over tables: in place of the model's
+   functions of these names, which straight code for so many vessels would make long and slow.
+
+   Keeps nothing: what a call needs lies in the work array that it is given. Needs the tables of vessel_loop.h and the
+   loop's steps, generated for one vessel (model.c) and for several at once (lane_kernels.h). */
+#include "vessel_loop.h"
+
 #include <stdbool.h>
 #include <string.h>
 
-#include "model.h"
-#include "loop.h"
-
-#if LOOP
-
 #include "lane_kernels.h"
+#include "model.h"
 
 enum { POSE = 12, PORT = 9, SEEN = 9, MOST_ARGUMENTS = 10, BLOCK = LOOP_BLOCK };
 
@@ -447,5 +450,3 @@ int composite_reverse(const double **arg, double **res, int *iw, double *w, int 
     frames_reverse(sources, now, v, wp, w);
     return 0;
 }
-
-#endif
