@@ -1,7 +1,7 @@
 /* What happens to the angular velocity when inputs change: see supervessel/rotation/changes.py.
 
-   The FMU has changes.c where a change of inputs can change the rate, else no_changes.c. With changes.c goes the file of
-   what the state of model exchange is (momentum_state.c, rate_state.c), and that of what masses and poses keep
+   The FMU has changes.c where a change of inputs can change the rate, else no_changes.c. With changes.c goes the file
+   of what the state of model exchange is (momentum_state.c, rate_state.c), and that of what masses and poses keep
    (kept_momentum.c, kept_rate.c). */
 #ifndef CHANGES_H
 #define CHANGES_H

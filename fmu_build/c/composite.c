@@ -1,7 +1,8 @@
-/* The composite that follows from the inputs: judges each, computes mass, barycentre and inertia, judges these together.
+/* The composite that follows from the inputs: judges each, computes mass, barycentre and inertia, judges these
+   together.
 
-   Owns composite_is_current, composite_is_ordinary, axes_are_current and a of Dynamics, and the candidate in scratch; p and
-   c become current by changes_apply. Needs of the model: composite, axes. */
+   Owns composite_is_current, composite_is_ordinary, axes_are_current and a of Dynamics, and the candidate in scratch; p
+   and c become current by changes_apply. Needs of the model: composite, axes. */
 #include "composite.h"
 
 #include <float.h>

@@ -10,7 +10,8 @@ static int part_of(const int joined[], int vessel) {
 }
 
 /* Adds a closed dock to those before it: each port once, no loop. */
-static Status close_dock(Instance *instance, const Dock *closing, const Dock *const closed[], size_t count, int joined[]) {
+static Status close_dock(Instance *instance, const Dock *closing, const Dock *const closed[], size_t count,
+                         int joined[]) {
     for (size_t i = 0; i < count; i++)
         for (size_t k = 0; k < 4; k++)
             if (strcmp(closing->ports[k / 2], closed[i]->ports[k % 2]) == 0)

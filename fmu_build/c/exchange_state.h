@@ -1,5 +1,5 @@
-/* What the state of model exchange holds beside the attitude: the angular velocity (rate_state.c) or, where every change
-   of inputs keeps it, the angular momentum (momentum_state.c). For changes.c alone. */
+/* What the state of model exchange holds beside the attitude: the angular velocity (rate_state.c) or, where every
+   change of inputs keeps it, the angular momentum (momentum_state.c). For changes.c alone. */
 #ifndef EXCHANGE_STATE_H
 #define EXCHANGE_STATE_H
 

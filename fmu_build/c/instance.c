@@ -1,7 +1,7 @@
 /* The life cycle of an instance and its log: made, reset, judged by the state that a call may come in, set going.
 
-   Owns the instance's memory and all that is not in Dynamics; of that the state, the times, the tolerance, and the states
-   as the start parameters make them. */
+   Owns the instance's memory and all that is not in Dynamics; of that the state, the times, the tolerance, and the
+   states as the start parameters make them. */
 #include "instance.h"
 
 #include <float.h>

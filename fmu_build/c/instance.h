@@ -1,11 +1,11 @@
 /* An instance of the model: its memory, its life cycle, its log.
 
    An instance is one block of memory, owned by the importer between instance_new and instance_free; nothing else is
-   allocated but saved states. Functions return STATUS_OK, or log one line and return what the FMI function shall return:
-   after STATUS_DISCARD the instance is as it was before the call, after STATUS_ERROR it is TERMINATED.
+   allocated but saved states. Functions return STATUS_OK, or log one line and return what the FMI function shall
+   return: after STATUS_DISCARD the instance is as it was before the call, after STATUS_ERROR it is TERMINATED.
 
-   A mass on its way from the importer's set to its get. Each box is a copy; beside the arrow stands the file that
-   writes the copy which the arrow points to.
+   A mass on its way from the importer's set to a get, copy by copy; beside each arrow stands the file that owns the
+   copy which the arrow points to: it alone writes there.
 
        importer: SetFloat64
           |
@@ -27,7 +27,7 @@
           |
           |  solver.c, at the end of a step; changes.c, at the end of an event
           v
-       now.stepped_p, now.kept_c         what the next change begins from
+       now.stepped_p                     what the next change begins from (its composite: now.kept_c, changes.c)
 
    A saved state is a copy of `now`, owned by the importer: saved_state.c. */
 #ifndef INSTANCE_H
@@ -142,7 +142,8 @@ struct Instance {
     union {
         Candidate candidate;
         Variation variation;
-    } scratch;                        /* what nobody keeps: whoever uses one has made the composite current before */
+    } scratch;                        /* nothing in it outlasts a call; making the composite current takes the */
+                                      /* candidate, so that comes before anything is laid into the variation */
     const double *arg[WORK_ARG];
     double *res[WORK_RES];
     int iw[WORK_INT];

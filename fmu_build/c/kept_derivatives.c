@@ -1,5 +1,5 @@
-/* Derivatives of the angular velocity by the inputs, where some kinds of change keep the momentum and others the rate: in
-   co-simulation the rate follows from the inputs as kept_momentum.c makes it.
+/* Derivatives of the angular velocity by the inputs, where some kinds of change keep the momentum and others the rate:
+   in co-simulation the rate follows from the inputs as kept_momentum.c makes it.
 
    Needs of the model: derivatives of composite and keep_momentum. */
 #include <string.h>

@@ -1,4 +1,4 @@
-/* A scene in which no change of inputs changes the rate: what changes.h declares has nothing to do but to keep p and c. */
+/* No change of inputs changes the rate: of what changes.h declares nothing is left to do but to keep p and c. */
 #include <string.h>
 
 #include "changes.h"

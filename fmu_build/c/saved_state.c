@@ -1,7 +1,7 @@
 /* Saved states: copies of Dynamics as they are, and as bytes behind a header that tells whose they are.
 
-   Owns nothing: a saved state is the importer's until it is freed. Needs the token, by which states of other models, or of
-   other versions of this one, are refused. */
+   Owns nothing: a saved state is the importer's until it is freed. Needs the token, by which states of other models, or
+   of other versions of this one, are refused. */
 #include "saved_state.h"
 
 #include <stdint.h>

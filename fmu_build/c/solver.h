@@ -1,5 +1,5 @@
-/* A communication step of co-simulation, and what its sub-steps have in common. How a sub-step is taken is the method's:
-   the FMU has one file with solver_advance, that of its scene's plan. */
+/* A communication step of co-simulation, and what its sub-steps have in common. How a sub-step is taken is the
+   method's: the FMU has one file with solver_advance, that of its scene's plan. */
 #ifndef SOLVER_H
 #define SOLVER_H
 

@@ -8,8 +8,8 @@ enum { GYROSCOPIC = PRODUCT_COUNT > 0, TURNED = PRODUCT_COUNT > 3 };
 
 enum { WIDTH = GYROSCOPIC ? 10 : 7 };
 
-/* What the products take of a coefficient: seven of the turn or the rates, see _turn in supervessel/rotation/propagators/taylor.py, then the rates, in
-   an order that lets compilers take all by twos. */
+/* What the products take of a coefficient: seven of the turn or the rates, see _turn in
+   supervessel/rotation/propagators/taylor.py, then the rates, in an order that lets compilers take all by twos. */
 typedef struct {
     double of[WIDTH];
 } Row;

@@ -1,8 +1,8 @@
 /* Getting and setting variables by value reference.
 
-   Owns now.values: inputs and parameters as they were set, outputs, states and rates once they are asked for. A get makes
-   current what it reads and no more, so that a composite that cannot be computed spoils only what follows from it. Needs
-   of the model: outputs, ode. */
+   Owns now.values: inputs and parameters as they were set, outputs, states and rates once they are asked for. A get
+   makes current what it reads and no more, so that a composite that cannot be computed spoils only what follows from
+   it. Needs of the model: outputs, ode. */
 #include "variables.h"
 
 #include <math.h>

@@ -11,7 +11,7 @@
 #include "lane_kernels.h"
 #include "model.h"
 
-enum { POSE = 12, PORT = 9, SEEN = 9, MOST_ARGUMENTS = 10, BLOCK = LOOP_BLOCK };
+enum { POSE = LOOP_POSE, PORT = LOOP_PORT, SEEN = LOOP_SEEN, BLOCK = LOOP_BLOCK };
 
 /* What follows from p. Of poses and of bodies seen from the root as many stand side by side as in the tables; the
    root's own pose is the last of the first ones. */

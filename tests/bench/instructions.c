@@ -39,7 +39,8 @@ int main(int count, char **words) {
     char **word = words + 6;
     Variables set = read_variables(&word), got = read_variables(&word);
     double *start = calloc(set.count + 1, sizeof *start);
-    fmi3Instance f = instantiate("counted", words[2], NULL, false, true, false, false, NULL, 0, NULL, log_message, NULL);
+    fmi3Instance f =
+        instantiate("counted", words[2], NULL, false, true, false, false, NULL, 0, NULL, log_message, NULL);
     if (!f || !start) return 1;
     check(enter(f, false, 0.0, 0.0, false, 0.0), "enter");
     check(leave(f), "leave");
