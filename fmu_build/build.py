@@ -36,7 +36,7 @@ def build_fmu(
     scene     : from `load_scene`
     output    : the file to write; its folder must be there. An old FMU is replaced once the new is whole;
                 anything else that is there, and is not empty, is refused (see `supervessel.shell.files`)
-    fmi       : version of the FMI standard, of `fmu_build.versions.VERSIONS`: 2 or 3
+    fmi       : version of the FMI standard, of `fmu_build.versions.VERSIONS`
     platforms : to compile for, of `fmu_build.platforms.PLATFORMS`; none: this machine's
     A scene with `[accuracy]` is built as `supervessel.choose` finds it; the evidence is in the archive.
     Raises BuildError if the compiler fails, the file cannot be written, or nothing is as exact as the scene

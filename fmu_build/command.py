@@ -1,4 +1,4 @@
-"""The command python -m fmu_build SCENE.toml [-o OUT.fmu] [--fmi 2|3] [--platform NAME ...|all]."""
+"""The command python -m fmu_build SCENE.toml [-o OUT.fmu] [--fmi VERSION] [--platform NAME ...|all]."""
 
 import argparse
 from collections.abc import Sequence

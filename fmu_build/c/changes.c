@@ -9,7 +9,7 @@
 
 #include "docks.h"
 #include "exchange_state.h"
-#include "kept_momentum.h"
+#include "kept_in_changes.h"
 
 static void copy_p(double to[], const double from[]) {
     memcpy(to, from, INPUT_P_COUNT * sizeof(double));

@@ -4,7 +4,7 @@
    Needs of the model: derivatives of composite and keep_momentum. */
 #include <string.h>
 
-#include "kept_momentum.h"
+#include "kept_in_changes.h"
 #include "model.h"
 
 /* Whether the angular velocity follows from inputs: in co-simulation, but not within a step. */

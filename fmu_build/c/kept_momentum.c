@@ -2,7 +2,7 @@
    committed: docks open, masses and moments change, then poses.
 
    Needs of the model: keep_momentum; INPUT_KINDS, which inputs are which. */
-#include "kept_momentum.h"
+#include "kept_in_changes.h"
 
 #include <string.h>
 

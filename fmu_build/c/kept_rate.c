@@ -1,5 +1,5 @@
 /* Masses and poses keep the rate when they change: only docks that close change it, see docking.c. */
-#include "kept_momentum.h"
+#include "kept_in_changes.h"
 
 Status rate_on_the_way(Instance *instance, const double p[], const double c[], double rate[3]) {
     (void)instance, (void)p, (void)c, (void)rate;

@@ -22,8 +22,8 @@ def documentation(
 
     entries  : the variable table
     evidence : of the choice of law and propagator, where the scene has `[accuracy]`
-    fmi      : version of the FMI standard, 2 or 3. FMI 2.0 has its icon in model.png; from 2.0.4 on it knows
-              the folder terminalsAndIcons too.
+    fmi      : version of the FMI standard, of `versions.VERSIONS`. FMI 2.0 has its icon in
+              model.png; from 2.0.4 on it knows the folder terminalsAndIcons too.
     The icons that terminalsAndIcons.xml names are among the files, the XML file itself is not.
     Raises BuildError if an installed package does not have its licence text where it should be.
     """

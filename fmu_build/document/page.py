@@ -53,7 +53,7 @@ def page(
 
     parts    : the scene, placed
     entries  : the variable table
-    fmi      : version of the FMI standard, 2 or 3
+    fmi      : version of the FMI standard, of `versions.VERSIONS`
     picture  : the drawing, an svg element
     evidence : of the choice of law and propagator, where the scene has `[accuracy]`
     """

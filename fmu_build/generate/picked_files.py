@@ -16,14 +16,16 @@ CHANGES = frozenset(
         "kept_momentum",
         "kept_rate",
         "kept_derivatives",
+        "exchange_state",
+        "kept_in_changes",
     }
 )
 STEPS = frozenset(WHEN_FREE.values()).union(*(method.c_files for method in PROPAGATORS.values()))
 
 PICKED = LOOP | BOOLEANS | CHANGES | STEPS
-"""Names, without .c, of the C files that not every FMU has. Their headers go with them, but for HEADERS."""
+"""Names, without .c and .h, of the files that not every FMU has, but for HEADERS."""
 
-HEADERS = frozenset({"changes.h", "docks.h", "booleans.h", "kept_momentum.h"})
+HEADERS = frozenset({"changes.h", "docks.h", "booleans.h"})
 """Headers of such files that are in every FMU: others include them."""
 
 
@@ -46,9 +48,13 @@ def _for_changes(model: Equations) -> frozenset[str]:
     scene = model.resolved.scene
     if model.change is None:
         return frozenset({"no_changes"})
-    found = {"changes", "docking"} if scene.inputs.docked else {"changes"}
-    momentum = keeps_momentum(scene)
-    found.add("momentum_state" if momentum else "rate_state")
-    if "momentum" not in scene.keeps.values():
-        return frozenset({*found, "kept_rate"})
-    return frozenset({*found, "kept_momentum"} if momentum else {*found, "kept_momentum", "kept_derivatives"})
+    found = {"changes", "exchange_state", "kept_in_changes"}
+    if scene.inputs.docked:
+        found.add("docking")
+    if keeps_momentum(scene):
+        found |= {"momentum_state", "kept_momentum"}
+    elif "momentum" in scene.keeps.values():
+        found |= {"rate_state", "kept_momentum", "kept_derivatives"}
+    else:
+        found |= {"rate_state", "kept_rate"}
+    return frozenset(found)

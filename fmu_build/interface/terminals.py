@@ -113,7 +113,7 @@ def terminals_and_icons(scene: Scene, entries: Sequence[TableEntry], fmi: int) -
     """Returns the text of terminalsAndIcons/terminalsAndIcons.xml.
 
     entries : the variable table
-    fmi     : version of the FMU, 2 or 3
+    fmi     : version of the FMU, of `versions.VERSIONS`
     """
     root = ET.Element("fmiTerminalsAndIcons", fmiVersion=VERSIONS[fmi].terminals)
     graphics = ET.SubElement(root, "GraphicalRepresentation")

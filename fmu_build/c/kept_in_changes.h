@@ -1,7 +1,7 @@
 /* What masses and poses keep when they change, as the scene says: momentum (kept_momentum.c) or the rate alone
    (kept_rate.c). */
-#ifndef KEPT_MOMENTUM_H
-#define KEPT_MOMENTUM_H
+#ifndef KEPT_IN_CHANGES_H
+#define KEPT_IN_CHANGES_H
 
 #include "changes.h"
 
