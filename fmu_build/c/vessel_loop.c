@@ -231,7 +231,7 @@ LANES_INLINE Lanes masses_of(const Sources sources, const LoopBody *const b[LANE
 /* Sums masses and first moments of a run of bodies of one kind. Returns where it ends.
    first : the first body's centre in every lane, which that body itself sets */
 LANES_INLINE size_t sum_run(const Sources sources, Chain *now, int kind, size_t j, Lanes first[3], double sum[4]) {
-    for (; j < LOOP_BODY_COUNT && LOOP_BODIES[j].kind == kind; j += LANES) {
+    for (; j < LOOP_BODY_COUNT && (int)LOOP_BODIES[j].kind == kind; j += LANES) {
         const LoopBody *b[LANES];
         take_bodies(b, j);
         const Lanes mass = masses_of(sources, b);
