@@ -74,6 +74,7 @@ bench: .venv/installed-dev
 	$(BIN)/python tests/bench/propagators.py
 	$(BIN)/python tests/bench/from_python.py
 	PYTHONPATH=tests $(BIN)/python tests/bench/interrupts.py
+	PYTHONPATH=tests $(BIN)/python tests/bench/instructions.py
 	mkdir -p build
 	$(BIN)/supervessel trade examples/iss_dg.toml --duration 6000 -o build/iss_dg_trade
 

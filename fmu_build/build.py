@@ -17,6 +17,7 @@ from fmu_build.generate.sources import source_file_names, source_files
 from fmu_build.interface.terminals import terminals_and_icons
 from fmu_build.interface.variable_table import TableEntry, variable_table
 from fmu_build.platforms import Platform, host_platform
+from fmu_build.versions import NEWEST, check_version
 from supervessel.equations import Equations, equations
 from supervessel.problems import TradeError
 from supervessel.scene.schema import Scene
@@ -27,13 +28,15 @@ ARCHIVE_TIME = (1980, 1, 1, 0, 0, 0)
 """Every file in an archive carries the same time, so that a scene gives the same bytes each time."""
 
 
-def build_fmu(scene: Scene, output: str | Path, fmi: int = 3, platforms: Sequence[Platform] = ()) -> Path:
+def build_fmu(
+    scene: Scene, output: str | Path, fmi: int = NEWEST, platforms: Sequence[Platform] = ()
+) -> Path:
     """Builds the FMU of a scene and returns its path.
 
     scene     : from `load_scene`
     output    : the file to write; its folder must be there. An old FMU is replaced once the new is whole;
                 anything else that is there, and is not empty, is refused (see `supervessel.shell.files`)
-    fmi       : version of the FMI standard, 2 or 3
+    fmi       : version of the FMI standard, of `fmu_build.versions.VERSIONS`
     platforms : to compile for, of `fmu_build.platforms.PLATFORMS`; none: this machine's
     A scene with `[accuracy]` is built as `supervessel.choose` finds it; the evidence is in the archive.
     Raises BuildError if the compiler fails, the file cannot be written, or nothing is as exact as the scene
@@ -44,8 +47,7 @@ def build_fmu(scene: Scene, output: str | Path, fmi: int = 3, platforms: Sequenc
         >>> build_fmu(scene, "iss_dg.fmu", fmi=2).name
         'iss_dg.fmu'
     """
-    if fmi not in (2, 3):
-        raise ValueError(f"fmi = {fmi}: must be 2 or 3")
+    check_version(fmi)
     output = Path(output)
     check_fmu_output(output)
     platforms = platforms or (host_platform(),)

@@ -1,4 +1,4 @@
-"""The command python -m fmu_build SCENE.toml [-o OUT.fmu] [--fmi 2|3] [--platform NAME ...|all]."""
+"""The command python -m fmu_build SCENE.toml [-o OUT.fmu] [--fmi VERSION] [--platform NAME ...|all]."""
 
 import argparse
 from collections.abc import Sequence
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fmu_build.platforms import PLATFORMS, Platform, platforms_named
+from fmu_build.versions import NEWEST, VERSIONS
 from supervessel.problems import printable
 from supervessel.shell.console import Parser, print_problem, print_results, show_progress
 from supervessel.shell.ending import say
@@ -29,7 +30,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "-o", "--output", type=Path, metavar="OUT.fmu", help="the FMU to write (default: NAME.fmu here)"
     )
-    parser.add_argument("--fmi", type=int, choices=(2, 3), default=3, help="FMI version (default: 3)")
+    parser.add_argument(
+        "--fmi", type=int, choices=tuple(VERSIONS), default=NEWEST, help="FMI version (default: %(default)s)"
+    )
     parser.add_argument(
         "--platform",
         nargs="+",

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from fmu_build.errors import BuildError
+from fmu_build.versions import VERSIONS
 from supervessel.problems import unknown
 
 
@@ -25,7 +26,7 @@ class Platform:
 
     def folder(self, fmi: int) -> str:
         """Returns the folder in binaries/ of an FMI version."""
-        return self.name if fmi == 3 else self.fmi2
+        return self.name if VERSIONS[fmi].platform_tuples else self.fmi2
 
 
 MACOS_X86_64 = Platform("x86_64-darwin", "x86_64-macos.11.0", "darwin64", ".dylib")
@@ -76,6 +77,6 @@ def library_contents(platforms: Sequence[Platform], fmi: int) -> dict[str, tuple
     there is a universal one, of both machines.
     """
     contents: dict[str, tuple[Platform, ...]] = {p.folder(fmi): (p,) for p in platforms}
-    if fmi == 2 and MACOS_AARCH64 in platforms:
+    if not VERSIONS[fmi].platform_tuples and MACOS_AARCH64 in platforms:
         contents[MACOS_X86_64.fmi2] = (MACOS_X86_64, MACOS_AARCH64)
     return contents

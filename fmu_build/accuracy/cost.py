@@ -80,7 +80,7 @@ def free_operations() -> FreeCosts:
 
 
 def series_operations(order: int, *, gyroscopic: bool, turned: bool) -> int:
-    """Returns what fmu_build/c/taylor.c takes for a sub-step (counted in tests/accuracy/test_cost.py).
+    """Returns what fmu_build/c/taylor_series.c takes for a sub-step (counted in tests/accuracy/test_cost.py).
 
     gyroscopic : whether the law has products of rates
     turned     : whether the series have axes of their own

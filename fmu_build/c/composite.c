@@ -1,3 +1,10 @@
+/* The composite that follows from the inputs: judges each, computes mass, barycentre and inertia, judges these
+   together.
+
+   Owns composite_is_current, composite_is_ordinary, axes_are_current and a of Dynamics, and the candidate in scratch; p
+   and c become current by changes_apply. Needs of the model: composite, axes. */
+#include "composite.h"
+
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -5,13 +12,9 @@
 #include <string.h>
 
 #include "changes.h"
+#include "docks.h"
 #include "model.h"
-
-/* A sum of two moments is compared with a third; see TRIANGLE_SLACK in supervessel/quantities.py. */
-static const double TRIANGLE_SLACK = 2.0 * DBL_EPSILON;
-
-/* Sine of the angle between a port's directions below which alignment says nothing. */
-static const double PARALLEL_LIMIT = 1e-6;
+#include "variables.h"
 
 /* Fourth powers of lengths within these bounds neither under- nor overflow. */
 static const double SHORTEST = 1e-60;
@@ -111,26 +114,22 @@ static Status check_inputs(Instance *instance, double p[]) {
             continue;
         else if (judged->check == CHECK_PMI)
             status = check_pmi(instance, variable, value);
-        else
+        else if (PORT_COUNT > 0)
             status = check_port(instance, variable, value, &p[place]);
     }
-#if DOCK_COUNT
-    if (status == STATUS_OK) status = changes_check_docks(instance, p);
-#endif
-    return status;
-}
-
-/* Whether motion can be computed with a composite whose mass can be used. */
-static bool is_usable(const double *c) {
-    const size_t count = LAW_TURNS ? COMPOSITE_COUNT : COMPOSITE_MARGINS;
-    bool usable = true;
-    for (size_t i = 0; i < count; i++) usable = usable && isfinite(c[i]);
-    for (size_t i = COMPOSITE_MARGINS; i < COMPOSITE_LAW && LAW_TURNS; i++) usable = usable && c[i] > 0.0;
-    return usable;
+    return status == STATUS_OK ? docks_check(instance, p) : status;
 }
 
 static bool has_mass(const double *c) {
     return c[COMPOSITE_MASS] > 0.0 && c[COMPOSITE_MASS] <= DBL_MAX;
+}
+
+bool composite_is_usable(const double c[]) {
+    const size_t count = LAW_TURNS ? COMPOSITE_COUNT : COMPOSITE_MARGINS;
+    bool usable = has_mass(c);
+    for (size_t i = 0; i < count; i++) usable = usable && isfinite(c[i]);
+    for (size_t i = COMPOSITE_MARGINS; i < COMPOSITE_LAW && LAW_TURNS; i++) usable = usable && c[i] > 0.0;
+    return usable;
 }
 
 /* Judges what the inputs make together. */
@@ -138,15 +137,13 @@ static Status check_composite(Instance *instance, const double *c) {
     if (!has_mass(c))
         return instance_refuse(instance, "mass = %.10g kg: the total of all vessels must be finite and > 0",
                                c[COMPOSITE_MASS]);
-    if (is_usable(c)) return STATUS_OK;
-#if SPINS
+    if (composite_is_usable(c)) return STATUS_OK;
     const double *h = &c[COMPOSITE_SPIN];
-    if (!isfinite(h[3]) && isfinite(c[COMPOSITE_MARGINS]))
+    if (SPINS && !isfinite(h[3]) && isfinite(c[COMPOSITE_MARGINS]))
         return instance_refuse(instance,
                                "the ports that move give the vessels (%.10g, %.10g, %.10g) N.m.s: what this does "
                                "leaves the range of finite numbers",
                                h[0], h[1], h[2]);
-#endif
     const double *J = &c[COMPOSITE_INERTIA];
     return instance_refuse(instance,
                            "inertia (xx, yy, zz, xy, xz, yz) = (%.10g, %.10g, %.10g, %.10g, %.10g, %.10g) kg.m2: "
@@ -154,26 +151,11 @@ static Status check_composite(Instance *instance, const double *c) {
                            J[0], J[1], J[2], J[3], J[4], J[5], LAW_TURNS ? " and positive definite" : "");
 }
 
-static void compute(Instance *instance, const double p[], double c[]) {
+void composite_compute(Instance *instance, const double p[], double c[]) {
     instance->arg[0] = p;
     instance->res[0] = c;
     composite(instance->arg, instance->res, instance->iw, instance->w, 0);
 }
-
-#if CHANGES
-
-Status composite_between(Instance *instance, const double p[], double c[]) {
-    compute(instance, p, c);
-    if (has_mass(c) && is_usable(c)) return STATUS_OK;
-    const double *J = &c[COMPOSITE_INERTIA];
-    return instance_refuse(instance,
-                           "between the changes of docks, masses and poses mass = %.10g kg, inertia (xx, yy, zz, xy, "
-                           "xz, yz) = (%.10g, %.10g, %.10g, %.10g, %.10g, %.10g) kg.m2: must be finite and positive "
-                           "definite for the angular momentum to be kept; make them one after the other",
-                           c[COMPOSITE_MASS], J[0], J[1], J[2], J[3], J[4], J[5]);
-}
-
-#endif
 
 /* Whether products of a few numbers of inputs and composite, and quotients by mass and moments, are doubles. */
 static bool makes_ordinary(const double p[], const double c[]) {
@@ -183,34 +165,21 @@ static bool makes_ordinary(const double p[], const double c[]) {
     return ordinary;
 }
 
-/* p and c become current. */
-static Status adopt(Instance *instance, const double p[], const double c[]) {
-#if CHANGES
-    return changes_apply(instance, p, c);
-#else
-    memcpy(instance->now.p, p, INPUT_P_COUNT * sizeof(double));
-    memcpy(instance->now.c, c, sizeof instance->now.c);
-    return STATUS_OK;
-#endif
-}
-
 Status composite_refresh(Instance *instance) {
     Dynamics *now = &instance->now;
     if (now->composite_is_current) return STATUS_OK;
-    double *p = instance->variation.inputs, *c = instance->variation.c;
+    double *p = instance->scratch.candidate.p, *c = instance->scratch.candidate.c;
     memcpy(p, &now->values[REFERENCE_P], INPUT_P_COUNT * sizeof(double));
     Status status = check_inputs(instance, p);
     if (status != STATUS_OK) return status;
     if (now->c[COMPOSITE_MASS] > 0.0 && memcmp(p, now->p, INPUT_P_COUNT * sizeof(double)) == 0) {
-#if CHANGES
-        status = changes_apply(instance, now->p, now->c);
-#endif
+        if (CHANGES) status = changes_apply(instance, now->p, now->c);
         now->composite_is_current = status == STATUS_OK; /* changed there and back */
         return status;
     }
-    compute(instance, p, c);
+    composite_compute(instance, p, c);
     status = check_composite(instance, c);
-    if (status == STATUS_OK) status = adopt(instance, p, c);
+    if (status == STATUS_OK) status = changes_apply(instance, p, c);
     if (status != STATUS_OK) return status;
     now->composite_is_current = true;
     now->composite_is_ordinary = makes_ordinary(now->p, now->c);
@@ -233,6 +202,7 @@ void composite_refresh_axes(Instance *instance) {
 }
 
 void composite_scale_variation(const Instance *instance, double p[]) {
+    if (PORT_COUNT == 0) return;
     for (const Judged *judged = JUDGED; judged->check != CHECK_NONE; judged++) {
         const size_t i = judged->reference;
         if (judged->check != CHECK_PORT) continue;

@@ -1,8 +1,15 @@
+/* Derivatives at what inputs and states are now: judges a request, lays its seed out as a Variation, calls the model's
+   derivatives of composite and response one after the other, and gathers what was asked for.
+
+   Owns the variation in scratch while a request is answered; changes nothing else but what a get would make current. */
+#include "derivatives.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "changes.h"
 #include "model.h"
+#include "variables.h"
 
 /* What a reference may stand for in a set of knowns or unknowns, as bits of (1 << role). */
 static unsigned allowed_knowns(const Instance *instance) {
@@ -23,12 +30,10 @@ static Status check_roles(Instance *instance, const unsigned references[], size_
         if (!(allowed & (1u << VARIABLES[references[i]].role)))
             return instance_error(instance, "%s cannot be %s of a derivative here", VARIABLES[references[i]].name,
                                   what);
-#if DOCK_COUNT
     for (size_t i = 0; i < count; i++)
-        if (VARIABLES[references[i]].type == TYPE_BOOLEAN)
+        if (is_boolean(references[i]))
             return instance_error(instance, "%s cannot be %s of a derivative: it is a Boolean",
                                   VARIABLES[references[i]].name, what);
-#endif
     return STATUS_OK;
 }
 
@@ -90,18 +95,9 @@ static double *place(Variation *v, unsigned reference) {
     }
 }
 
-#if !STATE_IS_MOMENTUM && (MASSES_KEEP_MOMENTUM || POSES_KEEP_MOMENTUM)
-
-/* Whether the angular velocity follows from inputs: in co-simulation, but not within a step. */
-static bool rate_follows(const Instance *instance) {
-    return !instance->now.model_exchange && !(changes_state(instance) & (BEFORE_START | INTERMEDIATE));
-}
-
-#endif
-
 /* From changes of x, u, c to changes of rate and y. ordinary: as of instance_call. */
 static void respond(Instance *instance, bool ordinary) {
-    Variation *v = &instance->variation;
+    Variation *v = &instance->scratch.variation;
     instance_set_state_arguments(instance);
     instance->arg[4] = v->x;
     instance->arg[5] = v->inputs + INPUT_P_COUNT + INPUT_K_COUNT;
@@ -123,7 +119,7 @@ static Status check_results(Instance *instance, const unsigned references[], siz
 static Status forward(Instance *instance, const unsigned unknowns[], size_t unknown_count, const unsigned knowns[],
                       size_t known_count, const double seed[], double sensitivity[]) {
     Status status = STATUS_OK;
-    Variation *v = &instance->variation;
+    Variation *v = &instance->scratch.variation;
     memset(v, 0, sizeof *v);
     bool shape_changes = false;
     for (size_t i = 0; i < known_count; i++) {
@@ -140,12 +136,9 @@ static Status forward(Instance *instance, const unsigned unknowns[], size_t unkn
         instance->res[0] = v->c;
         composite_forward(instance->arg, instance->res, instance->iw, instance->w, 0);
     }
-#if STATE_IS_MOMENTUM
     if (at_start) changes_start_forward(instance, v);
-#elif MASSES_KEEP_MOMENTUM || POSES_KEEP_MOMENTUM
-    if (shape_changes && rate_follows(instance)) status = changes_forward(instance, v);
+    if (shape_changes) status = changes_forward(instance, v);
     if (status != STATUS_OK) return status;
-#endif
     respond(instance, true);
     for (size_t i = 0; i < unknown_count; i++) sensitivity[i] = *place(v, unknowns[i]);
     return status;
@@ -166,8 +159,7 @@ Status derivatives_forward(Instance *instance, const unsigned unknowns[], size_t
 
 static Status adjoint(Instance *instance, const unsigned unknowns[], size_t unknown_count, const unsigned knowns[],
                       size_t known_count, const double seed[], double sensitivity[]) {
-    Status status = STATUS_OK;
-    Variation *v = &instance->variation;
+    Variation *v = &instance->scratch.variation;
     double on_states[STATE_COUNT];
     memset(v, 0, sizeof *v);
     for (size_t i = 0; i < unknown_count; i++) *place(v, unknowns[i]) += seed[i];
@@ -181,19 +173,15 @@ static Status adjoint(Instance *instance, const unsigned unknowns[], size_t unkn
     response_reverse(instance->arg, instance->res, instance->iw, instance->w, 0);
     if (instance->now.state & BEFORE_START) {
         for (size_t i = 0; i < STATE_COUNT; i++) v->x[i] += on_states[i];
-#if STATE_IS_MOMENTUM
         changes_start_reverse(instance, v);
-#endif
         project_attitude_start(instance, v->x);
     }
     instance->arg[0] = instance->now.p;
     instance->arg[1] = v->c;
     instance->res[0] = v->inputs;
     composite_reverse(instance->arg, instance->res, instance->iw, instance->w, 0);
-#if !STATE_IS_MOMENTUM && (MASSES_KEEP_MOMENTUM || POSES_KEEP_MOMENTUM)
-    if (rate_follows(instance)) status = changes_reverse(instance, v);
+    const Status status = changes_reverse(instance, v);
     if (status != STATUS_OK) return status;
-#endif
     composite_scale_variation(instance, v->inputs);
     for (size_t i = 0; i < known_count; i++) {
         const double *weight = place(v, knowns[i]);
@@ -224,14 +212,13 @@ Status derivatives_of_time(Instance *instance, const unsigned references[], size
         if (orders[i] != 1)
             status = instance_error(instance, "order %d of %s: only the first derivative is known", orders[i],
                                     VARIABLES[references[i]].name);
-    Variation *v = &instance->variation;
-    if (status == STATUS_OK) {
-        memset(v, 0, sizeof *v);
-        status = instance_get_rates(instance, v->x, STATE_COUNT);
-    }
+    double rates[STATE_COUNT];
+    if (status == STATUS_OK) status = instance_get_rates(instance, rates, STATE_COUNT);
     if (status != STATUS_OK) return status;
     composite_refresh_axes(instance);
-    memset(v->c, 0, sizeof v->c);
+    Variation *v = &instance->scratch.variation;
+    memset(v, 0, sizeof *v);
+    memcpy(v->x, rates, sizeof rates);
     respond(instance, instance_is_ordinary(instance) && are_ordinary(v->x, STATE_COUNT));
     for (size_t i = 0; i < count; i++) values[i] = v->y[references[i] - REFERENCE_OUTPUTS];
     return check_results(instance, references, count, values);

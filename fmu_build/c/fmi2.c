@@ -5,7 +5,11 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "booleans.h"
 #include "changes.h"
+#include "derivatives.h"
+#include "saved_state.h"
+#include "solver.h"
 
 enum {
     STARTED = INITIALIZATION | RUNNING | TERMINATED,
@@ -70,7 +74,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String token, 
         char shown[PRINT_SIZE];
         instance_print(name ? name : "", shown);
         if (functions && functions->logger)
-            functions->logger(functions->componentEnvironment, shown, fmi2Error, "logStatusError",
+            functions->logger(functions->componentEnvironment, shown, fmi2Error, LOG_NAME_ERROR,
                               problem ? problem : "fmi2Instantiate: out of memory");
         return NULL;
     }

@@ -6,7 +6,11 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "booleans.h"
 #include "changes.h"
+#include "derivatives.h"
+#include "saved_state.h"
+#include "solver.h"
 
 enum { REPORT_SIZE = 256 };
 
@@ -79,7 +83,7 @@ static void report(fmi3InstanceEnvironment environment, fmi3LogMessageCallback l
     if (!log_message) return;
     char message[REPORT_SIZE];
     snprintf(message, sizeof message, "%s: %s", call->name, problem);
-    log_message(environment, fmi3Error, "logStatusError", message);
+    log_message(environment, fmi3Error, LOG_NAME_ERROR, message);
 }
 
 /* What keeps an instance from being made, or NULL. */

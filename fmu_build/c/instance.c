@@ -1,4 +1,8 @@
-#include "changes.h"
+/* The life cycle of an instance and its log: made, reset, judged by the state that a call may come in, set going.
+
+   Owns the instance's memory and all that is not in Dynamics; of that the state, the times, the tolerance, and the
+   states as the start parameters make them. */
+#include "instance.h"
 
 #include <float.h>
 #include <locale.h>
@@ -8,21 +12,20 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "changes.h"
+#include "variables.h"
+
 enum { MESSAGE_SIZE = 1024, LONGEST_NAME = 200 };
 
 static const struct {
     const char *name;
     unsigned categories;
 } LOG_CATEGORIES[] = {
-    {"logStatusDiscard", LOG_DISCARD},
-    {"logStatusError", LOG_ERROR},
-    {"logComposite", LOG_COMPOSITE},
-    {"logAll", LOG_ALL},
+    {LOG_NAME_DISCARD, LOG_DISCARD},
+    {LOG_NAME_ERROR, LOG_ERROR},
+    {LOG_NAME_COMPOSITE, LOG_COMPOSITE},
+    {LOG_NAME_ALL, LOG_ALL},
 };
-
-/* Tolerances that an importer may ask for: what a scene may say, see supervessel/quantities.py. */
-static const double LEAST_TOLERANCE = 1e-15;
-static const double LARGEST_TOLERANCE = 0.1;
 
 static const size_t LOG_CATEGORY_COUNT = sizeof LOG_CATEGORIES / sizeof LOG_CATEGORIES[0];
 
@@ -183,7 +186,7 @@ Status instance_set_experiment(Instance *instance, bool tolerance_defined, doubl
     if (stop_time_defined && !(stop_time >= start_time))
         return instance_error(instance, "stopTime = %.10g s: must not be before startTime = %.10g s", stop_time,
                               start_time);
-    tolerance_defined = tolerance_defined && STEPS >= STEPS_BY_ERROR && !instance->now.model_exchange;
+    tolerance_defined = tolerance_defined && ERROR_CONTROLLED && !instance->now.model_exchange;
     if (tolerance_defined && !(tolerance >= LEAST_TOLERANCE && tolerance <= LARGEST_TOLERANCE))
         return instance_error(instance, "tolerance = %.10g: must be from %g to %g", tolerance, LEAST_TOLERANCE,
                               LARGEST_TOLERANCE);
@@ -222,14 +225,9 @@ Status instance_exit_initialization(Instance *instance) {
     Status status = instance_start_attitude(instance);
     if (status == STATUS_OK) status = composite_refresh(instance);
     if (status != STATUS_OK) return status;
-#if CHANGES
-    changes_commit(instance);
-#else
-    memcpy(instance->now.stepped_p, instance->now.p, sizeof instance->now.p);
-#endif
+    changes_start(instance);
     instance->now.state = instance->now.model_exchange ? EVENT : STEPPING;
-#if STATE_IS_MOMENTUM
-    instance_state_moved(instance); /* where the states lead now, the rate follows from them as it will ever after */
-#endif
+    /* where the states lead now, the rate follows from them as it will ever after */
+    if (STATE_IS_MOMENTUM) instance_state_moved(instance);
     return STATUS_OK;
 }

@@ -1,8 +1,35 @@
-/* An instance of the model: its life cycle, its log, its values.
+/* An instance of the model: its memory, its life cycle, its log.
 
-   An instance is one block of memory, owned by the importer between instance_new and instance_free. Functions
-   return STATUS_OK, or log one line and return what the FMI function shall return; after STATUS_DISCARD the
-   instance is as it was before the call, after STATUS_ERROR it is TERMINATED. */
+   An instance is one block of memory, owned by the importer between instance_new and instance_free; nothing else is
+   allocated but saved states. Functions return STATUS_OK, or log one line and return what the FMI function shall
+   return: after STATUS_DISCARD the instance is as it was before the call, after STATUS_ERROR it is TERMINATED.
+
+   A mass on its way from the importer's set to a get, copy by copy; beside each arrow stands the file that owns the
+   copy which the arrow points to: it alone writes there.
+
+       importer: SetFloat64
+          |
+          |  variables.c
+          v
+       now.values[its reference]         as it was set, judged by nobody yet; a get of the input reads this
+          |
+          |  composite.c                 at the first use: a step, an event, a get of what follows from it
+          v
+       scratch.candidate.p --> .c        judged; the composite of it computed; gone when the call ends
+          |
+          |  changes.c                   if all can be used: the rate changes with it, or the momentum
+          v
+       now.p --> now.c --> now.a         what everything after it reads (a: composite.c, once it is asked for)
+          |         |
+          |         |  variables.c       outputs of state, torque, c and a
+          |         v
+          |      now.values[outputs] --> importer: GetFloat64
+          |
+          |  solver.c, at the end of a step; changes.c, at the end of an event
+          v
+       now.stepped_p                     what the next change begins from (its composite: now.kept_c, changes.c)
+
+   A saved state is a copy of `now`, owned by the importer: saved_state.c. */
 #ifndef INSTANCE_H
 #define INSTANCE_H
 
@@ -10,7 +37,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "variables.h"
+#include "scene.h"
 
 #if defined(__GNUC__)
 #define PRINTF_LIKE(text, values) __attribute__((format(printf, text, values)))
@@ -64,46 +91,37 @@ typedef bool (*SubStepListener)(Instance *instance, double *end);
    them finds out which; an epoch that no step goes on from, as where torque acts again, costs nothing more. */
 typedef enum { EPOCH_NEW, EPOCH_SERVED, EPOCH_DOUBLED } EpochStep;
 
-/* All that a saved state holds. The doubles come first: there is no padding but at the end, and that stays zero. */
+/* All that a saved state holds. The doubles come first: there is no padding but at the end, and that stays zero. Arrays
+   that a scene does not need have one element, which stays zero too. */
 typedef struct {
     double values[VARIABLE_COUNT];    /* by value reference: time, inputs, parameters, outputs, states, rates */
     double start_time;                /* s */
     double stop_time;                 /* s, meaningful if stop_time_defined */
     double tolerance;                 /* the importer's or the scene's */
     double error_estimate;            /* rad, of the last communication step */
-#if STATE_IS_MOMENTUM
-    double x[STATE_COUNT];            /* attitude and angular velocity; the states hold the momentum */
-    double kept_momentum[3];          /* N.m.s, of the states when changes were committed last */
-#endif
-#if CHANGES
-    double kept_rate[3];              /* rad/s, that a change of inputs began from, with stepped_p */
-    double kept_c[COMPOSITE_COUNT];   /* the composite of stepped_p */
-#endif
+    double x[STATE_IS_MOMENTUM ? STATE_COUNT : 1]; /* attitude and angular velocity; the states hold the momentum */
+    double kept_momentum[STATE_IS_MOMENTUM ? 3 : 1]; /* N.m.s, of the states when changes were committed last */
+    double kept_rate[CHANGES ? 3 : 1]; /* rad/s, that a change of inputs began from, with stepped_p */
+    double kept_c[CHANGES ? COMPOSITE_COUNT : 1]; /* the composite of stepped_p */
     double p[INPUT_P_COUNT + 1];      /* the composite's inputs, directions scaled; + 1: may be none */
     double c[COMPOSITE_COUNT];        /* the composite of p */
     double a[AXES_COUNT + 1];         /* moments, axes and the like of c */
     double stepped_p[INPUT_P_COUNT + 1]; /* p of the last communication step or event, at first of the start */
     double epoch[STATE_COUNT];        /* the state that free motion is counted from */
     double elapsed, elapsed_rest;     /* s since then, as an unevaluated sum */
-#if FREE == FREE_ALWAYS || FREE == FREE_WHILE_FREE
     double from_epoch[FREE_START];    /* what free_at needs of the epoch, if epoch_step is EPOCH_SERVED */
-#endif
     unsigned state;                   /* a State */
     unsigned model_exchange;          /* else co-simulation */
-#if CHANGES
     unsigned ended_in;                /* the State before TERMINATED */
-#endif
     unsigned stop_time_defined;
     unsigned composite_is_current;    /* p and c follow from the inputs as they are */
     unsigned composite_is_ordinary;   /* products of a few numbers of p and c are doubles */
     unsigned axes_are_current;        /* a follows from c */
     unsigned epoch_holds;             /* the motion has been free since epoch, with stepped_p */
-#if FREE == FREE_ALWAYS || FREE == FREE_WHILE_FREE
     unsigned epoch_step;              /* an EpochStep */
-#endif
 } Dynamics;
 
-/* Small changes of, or weights on, what the model's functions take and give. */
+/* Small changes of, or weights on, what the model's functions take and give: see derivatives.c. */
 typedef struct {
     double inputs[INPUT_P_COUNT + INPUT_K_COUNT + INPUT_U_COUNT + 1]; /* + 1: there may be none; motion at contact */
                                                                       /* changes nothing between events */
@@ -111,14 +129,21 @@ typedef struct {
     double rate[STATE_COUNT], y[OUTPUT_COUNT + 1];
 } Variation;
 
+/* Inputs that are judged, directions scaled, and the composite of them: see composite_refresh. */
+typedef struct {
+    double p[INPUT_P_COUNT + 1], c[COMPOSITE_COUNT];
+} Candidate;
+
 struct Instance {
     Dynamics now;
     bool outputs_are_current;         /* the outputs in now.values follow from states, inputs and now.c */
     bool rates_are_current;           /* so do the rates */
-#if STATE_IS_MOMENTUM
-    bool mirror_is_current;           /* x and the states agree */
-#endif
-    Variation variation;
+    bool mirror_is_current;           /* x and the states agree, where these hold the momentum */
+    union {
+        Candidate candidate;
+        Variation variation;
+    } scratch;                        /* nothing in it outlasts a call; making the composite current takes the */
+                                      /* candidate, so that comes before anything is laid into the variation */
     const double *arg[WORK_ARG];
     double *res[WORK_RES];
     int iw[WORK_INT];
@@ -175,27 +200,19 @@ static inline double *instance_rates(Instance *instance) {
 
 /* Attitude and angular velocity. */
 static inline double *instance_x(Instance *instance) {
-#if STATE_IS_MOMENTUM
-    return instance->now.x;
-#else
-    return instance_states(instance);
-#endif
+    return STATE_IS_MOMENTUM ? instance->now.x : instance_states(instance);
 }
 
 /* Ends the instance. */
 static inline void instance_terminate(Instance *instance) {
-#if CHANGES
     if (instance->now.state != TERMINATED) instance->now.ended_in = instance->now.state;
-#endif
     instance->now.state = TERMINATED;
 }
 
 /* What follows from attitude, angular velocity or states has to be computed anew. */
 static inline void instance_state_moved(Instance *instance) {
     instance->outputs_are_current = instance->rates_are_current = false;
-#if STATE_IS_MOMENTUM
-    instance->mirror_is_current = false;
-#endif
+    if (STATE_IS_MOMENTUM) instance->mirror_is_current = false;
 }
 
 /* Points the first arguments of the model's functions to x, u, c, a, and the estimate. Of ode and response the first
@@ -209,16 +226,8 @@ static inline void instance_set_arguments(Instance *instance) {
 }
 static inline void instance_set_state_arguments(Instance *instance) {
     instance_set_arguments(instance);
-#if STATE_IS_MOMENTUM
     instance->arg[0] = instance_states(instance);
-#endif
 }
-
-/* Whether products of a few of these numbers are doubles. */
-bool are_ordinary(const double numbers[], size_t count);
-
-/* Whether all that follows from states, inputs and composite surely is within the range of doubles. */
-bool instance_is_ordinary(Instance *instance);
 
 typedef int ModelFunction(const double **arg, double **res, int *iw, double *w, int mem);
 
@@ -242,76 +251,5 @@ Status instance_exit_initialization(Instance *instance);
 /* Takes the states at the start from the parameters, the attitude at length 1. */
 Status instance_start_attitude(Instance *instance);
 void instance_start_rate(Instance *instance);
-
-/* variables.c: gets or sets values by value reference, all of them or none. */
-Status instance_get(Instance *instance, const unsigned references[], size_t count, double values[]);
-Status instance_set(Instance *instance, const unsigned references[], size_t count, const double values[]);
-Status instance_check_references(Instance *instance, const unsigned references[], size_t count);
-
-/* variables.c, where the scene has Booleans, all of them inputs: whether these references are such, and whether one
-   may be set to a value now: outside event mode it must keep the one it has. Then get and set cannot fail. */
-Status instance_check_booleans(Instance *instance, const unsigned references[], size_t count, const void *values);
-Status instance_check_boolean(Instance *instance, unsigned reference, bool value);
-bool instance_get_boolean(const Instance *instance, unsigned reference);
-void instance_set_boolean(Instance *instance, unsigned reference, bool value);
-
-/* Whether the state has an attitude that can be brought to unit length; a solver may have lost it. */
-Status instance_check_attitude(Instance *instance);
-
-/* continuous states of model exchange, in the order of the table */
-Status instance_set_time(Instance *instance, double time);
-Status instance_get_states(Instance *instance, double states[], size_t count);
-Status instance_set_states(Instance *instance, const double states[], size_t count);
-Status instance_get_rates(Instance *instance, double rates[], size_t count);
-Status instance_get_nominals(Instance *instance, double nominals[], size_t count);
-
-/* composite.c: makes c follow from the inputs, unless it does: judges them and computes the composite. */
-Status composite_refresh(Instance *instance);
-
-#if CHANGES
-/* Computes and judges the composite c of inputs p on the way of a change. */
-Status composite_between(Instance *instance, const double p[], double c[]);
-#endif
-
-/* Makes a follow from c, unless it does. */
-void composite_refresh_axes(Instance *instance);
-
-/* Multiplies a change of p, or weights on p as scaled, by the powers of two that the directions were scaled by. */
-void composite_scale_variation(const Instance *instance, double p[]);
-
-/* solver.c: advances the state from time [s] by one communication step of size h [s], or to where the importer
-   wants it to end early. */
-Status solver_step(Instance *instance, double time, double h, bool *ended_early);
-
-/* free.c: whether motion without torque from a state over a time [s] turns little enough to be followed. */
-bool free_reaches(const double x[], double time);
-
-/* Carries a state on by a time [s] of motion without torque. */
-Status free_motion(Instance *instance, const double x[], double time, double next[]);
-
-#if FREE == FREE_ALWAYS || FREE == FREE_WHILE_FREE
-/* The same from now.epoch, at a small cost from its second time on. */
-Status free_motion_from_epoch(Instance *instance, double time, double next[]);
-#endif
-
-/* derivatives.c: partial derivatives of outputs and rates by inputs and states, at what the outputs are now;
-   in INITIALIZATION of outputs, states and rates by inputs and parameters. Forward: sensitivity of unknowns to a
-   change (seed) of knowns. Adjoint: of the seed-weighted sum of unknowns to each known. */
-Status derivatives_forward(Instance *instance, const unsigned unknowns[], size_t unknown_count,
-                           const unsigned knowns[], size_t known_count, const double seed[], double sensitivity[]);
-Status derivatives_adjoint(Instance *instance, const unsigned unknowns[], size_t unknown_count,
-                           const unsigned knowns[], size_t known_count, const double seed[], double sensitivity[]);
-
-/* Derivatives of outputs with respect to time, inputs held; orders must be 1. */
-Status derivatives_of_time(Instance *instance, const unsigned references[], size_t count, const int orders[],
-                           double values[]);
-
-/* saved_state.c: copies of Dynamics, owned by the importer between save and free. */
-Status saved_state_save(Instance *instance, void **saved);
-Status saved_state_restore(Instance *instance, const void *saved);
-Status saved_state_free(Instance *instance, void **saved);
-Status saved_state_size(Instance *instance, const void *saved, size_t *size);
-Status saved_state_serialize(Instance *instance, const void *saved, unsigned char bytes[], size_t size);
-Status saved_state_deserialize(Instance *instance, const unsigned char bytes[], size_t size, void **saved);
 
 #endif

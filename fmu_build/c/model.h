@@ -38,7 +38,7 @@ int free_finish(const double **arg, double **res, int *iw, double *w, int mem); 
 int free_constants(const double **arg, double **res, int *iw, double *w, int mem);    /* x, a, scale -> k */
 int free_at(const double **arg, double **res, int *iw, double *w, int mem);           /* k, t -> x */
 
-/* Of these a scene has those whose composite is a loop; see supervessel/kernels.py. */
+/* Of these a scene has those whose composite is a loop; see kernels in supervessel/composite/chain.py. */
 int loop_hang_forward(const double **arg, double **res, int *iw, double *w, int mem);
 int loop_hang_reverse(const double **arg, double **res, int *iw, double *w, int mem);
 int loop_hang_inside_forward(const double **arg, double **res, int *iw, double *w, int mem);

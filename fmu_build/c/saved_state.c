@@ -1,8 +1,14 @@
+/* Saved states: copies of Dynamics as they are, and as bytes behind a header that tells whose they are.
+
+   Owns nothing: a saved state is the importer's until it is freed. Needs the token, by which states of other models, or
+   of other versions of this one, are refused. */
+#include "saved_state.h"
+
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "instance.h"
+#include "variables.h"
 
 /* A serialised state: magic, checksum of what follows it, length of the token, the token, Dynamics. */
 static const char MAGIC[8] = {'s', 'u', 'p', 'e', 'r', 'v', 's', '1'};

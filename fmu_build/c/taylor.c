@@ -1,172 +1,100 @@
-#include "taylor.h"
+/* Sub-steps of the propagator taylor: how long the series of taylor_series.c are followed, by the estimate of their
+   error.
 
-#include <math.h>
+   Needs of the model: by_torque, the acceleration by torque, and the map in a that says what the law's products are. */
+#include <string.h>
 
-#include "scene.h"
+#include "composite.h"
+#include "estimated_steps.h"
+#include "model.h"
+#include "taylor_series.h"
 
-#if STEPS == STEPS_BY_SERIES
-
-#if PRODUCT_COUNT == 0
-enum { WIDTH = 7 };
-#else
-enum { WIDTH = 10 };
-#endif
-
-/* What the products take of a coefficient: seven of the turn or the rates, see _turn in taylor.py, then the rates, in
-   an order that lets compilers take all by twos. */
-typedef struct {
-    double of[WIDTH];
-} Row;
-
-static double remainder_of(double before, double after) {
-    return after / sqrt(before > 0.0 ? before : 1.0);
+/* Of the series: what costs least, as taylor_order of supervessel/rotation/propagators/taylor.py has it. */
+static int series_order(double tolerance) {
+    const int order = 2 * (int)floor(TAYLOR_HALF_ORDER_AT_1 - TAYLOR_HALF_ORDER_SLOPE * log(tolerance));
+    return order < TAYLOR_LEAST_ORDER ? TAYLOR_LEAST_ORDER : order > TAYLOR_MOST_ORDER ? TAYLOR_MOST_ORDER : order;
 }
 
-/* sums: of products, element by element, of rows from `one` on and rows from `other` back. */
-static void add_products(const Row *one, const Row *other, int count, double sums[WIDTH]) {
-    double s[WIDTH] = {0.0};
-    for (int j = 0; j < count; j++)
-        for (int i = 0; i < WIDTH; i++) s[i] += one[j].of[i] * other[-j].of[i];
-    for (int i = 0; i < WIDTH; i++) sums[i] = s[i];
+static double smaller(double a, double b) {
+    return a < b ? a : b;
 }
 
-#if PRODUCT_COUNT > 3 /* the map has axes of its own */
+/* An error of the rate turns the body on for what remains, but those of many sub-steps nearly cancel: one counts for
+   this angle [rad] and this share of what remains at most (measured in tests/stability/test_tolerances.py). */
+static const double TURNED_ON = 3.0, TURNED_ON_SHARE = 0.1;
 
-/* Between body axes and those of the map. */
-static void from_body(const double map[], const double v[3], double out[3]) {
-    const double *R = map + 3;
-    for (int i = 0; i < 3; i++) out[i] = R[3 * i] * v[0] + R[3 * i + 1] * v[1] + R[3 * i + 2] * v[2];
+/* A sub-step may exceed by this factor the span that its series were made for. */
+static const double LONGEST_SHARE = 1.2;
+
+/* What of the error allowed a sub-step aims at: the estimate at another size than the series' is itself estimated. */
+static const double AIM = 0.8;
+
+/* What the error `found` at the communication step's end is where a sub-step's errors of attitude and rate, the larger
+   of the two by its own size, are no more than rounding. A body that neither turns nor accelerates has no errors. Divisors
+   are guarded, not divisions: compilers may divide before they ask. */
+static double rounding_of(double found, const double error[2], double speed) {
+    const double worst = larger(error[0], error[1] / (speed > 0.0 ? speed : 1.0));
+    return HALF_ULP * (found / (worst > 0.0 ? worst : 1.0));
 }
 
-static void to_body(const double map[], const double v[3], double out[3]) {
-    const double *R = map + 3;
-    for (int i = 0; i < 3; i++) out[i] = R[i] * v[0] + R[3 + i] * v[1] + R[6 + i] * v[2];
+/* For how long [s] an error of the rate counts. */
+static double reach_of(double remaining, double speed) {
+    if (!(speed > 0.0)) return remaining;
+    const double left = larger(remaining, 1.0 / speed);
+    return smaller(left, TURNED_ON / speed + TURNED_ON_SHARE * left);
 }
 
-#else
-
-static void from_body(const double map[], const double v[3], double out[3]) {
-    (void)map;
-    for (int i = 0; i < 3; i++) out[i] = v[i];
+static void begin_series(Instance *instance, Progress *progress) {
+    memset(progress->rest, 0, sizeof progress->rest);
+    progress->drift = 0.0;
+    composite_refresh_axes(instance);
+    progress->exponent = series_order(instance->now.tolerance) + 1;
+    instance->arg[0] = &instance->now.values[REFERENCE_TORQUE];
+    instance->arg[1] = instance->now.c;
+    instance->res[0] = progress->acceleration;
+    by_torque(instance->arg, instance->res, instance->iw, instance->w, 0);
+    progress->next_size = estimated_first_size(instance, progress);
 }
 
-static void to_body(const double map[], const double v[3], double out[3]) {
-    from_body(map, v, out);
-}
-
-#endif
-
-/* Fills the rows of one coefficient. */
-static void spread(const double turn[4], const double rate[3], double step, double one[WIDTH], double other[WIDTH]) {
-    const double even = turn[0] + turn[2], odd = turn[1] + turn[3], p = turn[0] - turn[2], q = turn[1] - turn[3];
-    one[0] = even + odd;
-    one[1] = even - odd;
-    one[2] = p + q;
-    one[3] = p - q;
-    one[4] = turn[3];
-    one[5] = turn[1];
-    one[6] = turn[2];
-    const double eighth = 0.125 * step, y = eighth * rate[1];
-    const double plus = eighth * rate[0] + eighth * rate[2], minus = eighth * rate[0] - eighth * rate[2];
-    other[0] = plus + y;
-    other[1] = y - plus;
-    other[2] = minus - y;
-    other[3] = -y - minus;
-    other[4] = -step * rate[1];
-    other[5] = -step * rate[2];
-    other[6] = -step * rate[0];
-#if PRODUCT_COUNT > 0
-    one[8] = other[7] = rate[1];
-    one[9] = other[8] = rate[2];
-    one[7] = other[9] = rate[0];
-#endif
-}
-
-static void estimate(Series *series) {
-    double before[2] = {0.0, 0.0}, after[2] = {0.0, 0.0};
-    for (int k = series->order - 3; k <= series->order; k++) {
-        double *squares = k < series->order - 1 ? before : after;
-        for (int i = 0; i < 4; i++) squares[0] += series->turn[k][i] * series->turn[k][i];
-        for (int i = 0; i < 3; i++) squares[1] += series->rates[k][i] * series->rates[k][i];
-    }
-    series->error[0] = 2.0 * remainder_of(before[0], after[0]);
-    series->error[1] = remainder_of(before[1], after[1]);
-}
-
-void taylor_series(const double x[7], const double acceleration[3], const double map[], double step, Series *series) {
-    Row ones[TAYLOR_MOST_ORDER], others[TAYLOR_MOST_ORDER];
-    double w[3], push[3];
-    from_body(map, x + 4, w);
-    from_body(map, acceleration, push);
-    const double half = 0.5 * step, X = half * w[0], Y = half * w[1], Z = half * w[2];
-    const int order = series->order;
-    double(*turn)[4] = series->turn, (*rates)[3] = series->rates;
-    for (int i = 0; i < 3; i++) rates[0][i] = w[i];
-    turn[0][0] = turn[0][1] = turn[0][2] = turn[0][3] = 0.0;
-    turn[1][0] = 0.0;
-    turn[1][1] = X;
-    turn[1][2] = Y;
-    turn[1][3] = Z;
-    for (int i = 0; i < 3; i++) rates[1][i] = step * push[i];
-#if PRODUCT_COUNT > 0
-    const double pull[3] = {step * map[0], step * map[1], step * map[2]};
-    for (int i = 0; i < 3; i++) rates[1][i] = pull[i] * (w[(i + 1) % 3] * w[(i + 2) % 3]) + rates[1][i];
-#endif
-    for (int k = 1; k < order; k++) {
-        const double *p = turn[k], *v = rates[k], scale = 1.0 / (k + 1);
-        double s[WIDTH];
-        add_products(ones + 1, others + (k - 1), k - 1, s);
-        const double even = s[0] + s[2], odd = s[1] + s[3], f = s[0] - s[2], g = s[1] - s[3];
-        double *next = turn[k + 1], *rate = rates[k + 1];
-        next[0] = scale * (-(even + odd) - ((p[1] * X + p[2] * Y) + p[3] * Z));
-        next[1] = scale * ((((even - odd) + s[4]) + half * v[0]) + ((p[0] * X + p[2] * Z) - p[3] * Y));
-        next[2] = scale * ((((f + g) + s[5]) + half * v[1]) + ((p[0] * Y + p[3] * X) - p[1] * Z));
-        next[3] = scale * ((((f - g) + s[6]) + half * v[2]) + ((p[0] * Z + p[1] * Y) - p[2] * X));
-#if PRODUCT_COUNT > 0
-        rate[0] = (scale * pull[0]) * (s[8] + (w[1] * v[2] + v[1] * w[2]));
-        rate[1] = (scale * pull[1]) * (s[9] + (w[2] * v[0] + v[2] * w[0]));
-        rate[2] = (scale * pull[2]) * (s[7] + (w[0] * v[1] + v[0] * w[1]));
-#else
-        rate[0] = rate[1] = rate[2] = 0.0;
-#endif
-        if (k + 1 < order) spread(p, v, step, ones[k].of, others[k].of);
-    }
-    estimate(series);
-}
-
-void taylor_sum(const Series *series, const double x[7], const double map[], double share, double next[7],
-                double rest[3]) {
-    double turned[2][4] = {{0.0}}, gained[2][3] = {{0.0}}, axis[3], gain[3];
-    const double square = share * share;
-    for (int k = series->order; k > 0; k -= 2) { /* the smallest first */
-        for (int i = 0; i < 4; i++) turned[0][i] = turned[0][i] * square + series->turn[k][i];
-        for (int i = 0; i < 4; i++) turned[1][i] = turned[1][i] * square + series->turn[k - 1][i];
-        for (int i = 0; i < 3; i++) gained[0][i] = gained[0][i] * square + series->rates[k][i];
-        for (int i = 0; i < 3; i++) gained[1][i] = gained[1][i] * square + series->rates[k - 1][i];
-    }
-    for (int i = 0; i < 4; i++) turned[0][i] = turned[0][i] * square + turned[1][i] * share;
-    for (int i = 0; i < 3; i++) gained[0][i] = gained[0][i] * square + gained[1][i] * share;
-    to_body(map, turned[0] + 1, axis);
-    to_body(map, gained[0], gain);
-    const double a = turned[0][0], b = axis[0], c = axis[1], d = axis[2];
-    const double q[4] = {
-        x[0] + (x[0] * a - (x[1] * b + x[2] * c + x[3] * d)),
-        x[1] + (x[0] * b + x[1] * a + (x[2] * d - x[3] * c)),
-        x[2] + (x[0] * c + x[2] * a + (x[3] * b - x[1] * d)),
-        x[3] + (x[0] * d + x[3] * a + (x[1] * c - x[2] * b)),
-    };
-    const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    for (int i = 0; i < 4; i++) next[i] = q[i] / length;
-    for (int i = 0; i < 3; i++) { /* Knuth's sum: next and rest together are exact */
-        const double added = gain[i] + rest[i], sum = x[4 + i] + added, back = sum - x[4 + i];
-        rest[i] = (x[4 + i] - (sum - back)) + (added - back);
-        next[4 + i] = sum;
+/* Takes one sub-step whose estimated error, as it shows at the communication step's end, stays within its share of the
+   tolerance by time, or within rounding. Series hold for any time: they are summed up at that which the error allows,
+   and no sub-step is taken again but for lack of finite numbers. */
+Status solver_sub_step(Instance *instance, Progress *progress) {
+    if (progress->next_size == 0.0) begin_series(instance, progress);
+    const double *x = instance_x(instance), *map = &instance->now.a[AXES_SERIES];
+    Series series;
+    series.order = progress->exponent - 1;
+    for (;;) {
+        const double size = planned_size(progress);
+        progress->taken += 1.0;
+        const double count = progress->taken - 1.0 + progress->remaining / size;
+        if (!(count <= MOST_SUB_STEPS)) return estimated_refuse_count(instance, progress, count);
+        taylor_series(x, progress->acceleration, map, size, &series);
+        const double speed = length_of(series.rates[0]) + length_of(series.rates[1]);
+        const double reach = reach_of(progress->remaining, speed);
+        const double found = series.error[0] + series.error[1] * reach;
+        const double rounding = rounding_of(found, series.error, speed);
+        const double allowed = larger(SAFETY * instance->now.tolerance * (size / progress->h), rounding);
+        const bool seen = found > NO_ERROR * allowed;
+        const double best = seen ? pow(AIM * allowed / found, 1.0 / series.order) : MOST_GROWTH;
+        double taken = size, next[STATE_COUNT];
+        if (!(found <= allowed)) taken = without_rest(progress, best * size);
+        else if (best > 1.0 && 2.0 * LONGEST_SHARE * size < progress->remaining)
+            taken = without_rest(progress, smaller(best, LONGEST_SHARE) * size);
+        const double share = taken / size;
+        double rest[3];
+        memcpy(rest, progress->rest, sizeof rest);
+        taylor_sum(&series, x, map, share, next, rest);
+        if (isfinite(found) && is_finite(next)) {
+            const double error = share == 1.0 ? found : AIM * allowed * share;
+            const double turned_on = 2.0 * HALF_ULP * speed * progress->remaining; /* adds up as a random walk does */
+            const double drift = sqrt(progress->drift * progress->drift + turned_on * turned_on);
+            memcpy(progress->rest, rest, sizeof rest);
+            go_on(instance, progress, next, taken, error + HALF_ULP * (1.0 + speed * size) + (drift - progress->drift));
+            progress->drift = drift;
+            progress->next_size = size * smaller(best, MOST_GROWTH);
+            return STATUS_OK;
+        }
+        progress->next_size = 0.2 * size;
     }
 }
-
-#else
-
-/* C99 wants something to compile. */
-typedef int NoSeries;
-
-#endif

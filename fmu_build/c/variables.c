@@ -1,3 +1,10 @@
+/* Getting and setting variables by value reference.
+
+   Owns now.values: inputs and parameters as they were set, outputs, states and rates once they are asked for. A get
+   makes current what it reads and no more, so that a composite that cannot be computed spoils only what follows from
+   it. Needs of the model: outputs, ode. */
+#include "variables.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -8,17 +15,8 @@
 static const double SMALLEST_SQUARE = 1e-200;
 static const double LARGEST_SQUARE = 1e200;
 
-static Status unknown_reference(Instance *instance, unsigned reference) {
+Status instance_unknown_reference(Instance *instance, unsigned reference) {
     return instance_error(instance, "value reference %u is unknown; the largest is %d", reference, VARIABLE_COUNT - 1);
-}
-
-static bool is_boolean(unsigned reference) {
-#if DOCK_COUNT
-    return VARIABLES[reference].type == TYPE_BOOLEAN;
-#else
-    (void)reference;
-    return false;
-#endif
 }
 
 static Status refuse_boolean(Instance *instance, unsigned reference) {
@@ -29,7 +27,7 @@ Status instance_check_references(Instance *instance, const unsigned references[]
     if (count == 0) return STATUS_OK;
     if (!references) return instance_error(instance, "the array of value references is NULL");
     for (size_t i = 0; i < count; i++)
-        if (references[i] >= VARIABLE_COUNT) return unknown_reference(instance, references[i]);
+        if (references[i] >= VARIABLE_COUNT) return instance_unknown_reference(instance, references[i]);
     return STATUS_OK;
 }
 
@@ -100,13 +98,8 @@ static Status beyond_range(Instance *instance, size_t reference) {
 /* What must be current before a variable is read. In continuous time inputs leave the states as they are. */
 static unsigned follows(const Instance *instance, unsigned reference) {
     const unsigned all = VARIABLES[reference].follows;
-#if CHANGES
-    const bool is_state = VARIABLES[reference].role == ROLE_STATE;
-    if (is_state && changes_state(instance) == CONTINUOUS) return all & ~(unsigned)FOLLOWS_COMPOSITE;
-#else
-    (void)instance;
-#endif
-    return all;
+    const bool is_state = CHANGES && VARIABLES[reference].role == ROLE_STATE;
+    return is_state && changes_state(instance) == CONTINUOUS ? all & ~(unsigned)FOLLOWS_COMPOSITE : all;
 }
 
 Status instance_get(Instance *instance, const unsigned references[], size_t count, double values[]) {
@@ -114,7 +107,7 @@ Status instance_get(Instance *instance, const unsigned references[], size_t coun
     if (!references || !values) return instance_error(instance, "an array is NULL");
     unsigned wanted = 0;
     for (size_t i = 0; i < count; i++) {
-        if (references[i] >= VARIABLE_COUNT) return unknown_reference(instance, references[i]);
+        if (references[i] >= VARIABLE_COUNT) return instance_unknown_reference(instance, references[i]);
         if (is_boolean(references[i])) return refuse_boolean(instance, references[i]);
         wanted |= follows(instance, references[i]);
     }
@@ -157,7 +150,7 @@ static bool is_input(unsigned reference) {
 
 /* Whether a value may be stored: known, settable in this state, finite. */
 static Status check_set(Instance *instance, unsigned reference, double value) {
-    if (reference >= VARIABLE_COUNT) return unknown_reference(instance, reference);
+    if (reference >= VARIABLE_COUNT) return instance_unknown_reference(instance, reference);
     if (is_boolean(reference)) return refuse_boolean(instance, reference);
     const Variable *variable = &VARIABLES[reference];
     if (variable->role != ROLE_INPUT) {
@@ -168,32 +161,21 @@ static Status check_set(Instance *instance, unsigned reference, double value) {
     return refuse_not_finite(instance, variable, value);
 }
 
-#if CHANGES
-
 static bool hold_states(const unsigned references[], size_t count) {
     bool held = false;
     for (size_t i = 0; i < count; i++) held = held || references[i] >= REFERENCE_STATES;
     return held;
 }
 
-#endif
-
 /* States that are set in event mode go with the inputs set before them: those are judged, and make their change. */
 static Status before_states(Instance *instance) {
-#if CHANGES
-    if (instance->now.state == EVENT) return composite_refresh(instance);
-#else
-    (void)instance;
-#endif
-    return STATUS_OK;
+    return CHANGES && instance->now.state == EVENT ? composite_refresh(instance) : STATUS_OK;
 }
 
 /* What is set after them makes a change that begins from them. */
 static void after_states(Instance *instance) {
     instance_state_moved(instance);
-#if CHANGES
     if (instance->now.state == EVENT) changes_commit(instance);
-#endif
 }
 
 Status instance_set(Instance *instance, const unsigned references[], size_t count, const double values[]) {
@@ -204,11 +186,9 @@ Status instance_set(Instance *instance, const unsigned references[], size_t coun
         const Status status = check_set(instance, references[i], values[i]);
         if (status != STATUS_OK) return status;
     }
-#if CHANGES
-    const bool holds_states = (instance->now.state & (EVENT | CONTINUOUS)) && hold_states(references, count);
+    const bool holds_states = CHANGES && (instance->now.state & (EVENT | CONTINUOUS)) && hold_states(references, count);
     const Status status = holds_states ? before_states(instance) : STATUS_OK;
     if (status != STATUS_OK) return status;
-#endif
     bool changed = false, shape_changed = false;
     for (size_t i = 0; i < count; i++) {
         double *value = &instance->now.values[references[i]];
@@ -217,45 +197,11 @@ Status instance_set(Instance *instance, const unsigned references[], size_t coun
         changed = true;
         shape_changed = shape_changed || references[i] < REFERENCE_TORQUE;
     }
-#if CHANGES
     if (holds_states) after_states(instance);
-#endif
     if (changed) instance->outputs_are_current = instance->rates_are_current = false;
     if (shape_changed) instance->now.composite_is_current = false;
     return STATUS_OK;
 }
-
-#if DOCK_COUNT
-
-Status instance_check_booleans(Instance *instance, const unsigned references[], size_t count, const void *values) {
-    if (count == 0) return STATUS_OK;
-    if (!references || !values) return instance_error(instance, "an array is NULL");
-    for (size_t i = 0; i < count; i++) {
-        if (references[i] >= VARIABLE_COUNT) return unknown_reference(instance, references[i]);
-        if (!is_boolean(references[i]))
-            return instance_error(instance, "%s is a number, not a Boolean", VARIABLES[references[i]].name);
-    }
-    return STATUS_OK;
-}
-
-Status instance_check_boolean(Instance *instance, unsigned reference, bool value) {
-    const unsigned held = instance->event_mode_used ? STEPPING | CONTINUOUS : CONTINUOUS;
-    if (!(instance->now.state & held) || value == instance_get_boolean(instance, reference)) return STATUS_OK;
-    return instance_error(instance, "%s is discrete: once initialisation is left, it can be changed in event mode only",
-                          VARIABLES[reference].name);
-}
-
-bool instance_get_boolean(const Instance *instance, unsigned reference) {
-    return instance->now.values[reference] != 0.0;
-}
-
-void instance_set_boolean(Instance *instance, unsigned reference, bool value) {
-    if (value == instance_get_boolean(instance, reference)) return;
-    instance->now.values[reference] = value ? 1.0 : 0.0;
-    instance->now.composite_is_current = instance->outputs_are_current = instance->rates_are_current = false;
-}
-
-#endif
 
 Status instance_set_time(Instance *instance, double time) {
     if (!isfinite(time)) return instance_refuse(instance, "time = %.10g s: must be finite", time);

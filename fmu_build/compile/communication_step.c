@@ -4,7 +4,10 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "booleans.h"
 #include "instance.h"
+#include "solver.h"
+#include "variables.h"
 
 #if defined(_WIN32)
 #define EXPORTED __declspec(dllexport)

@@ -7,6 +7,7 @@ from fmu_build.document.licences import licence_files
 from fmu_build.document.page import page
 from fmu_build.interface.terminals import terminal_icons
 from fmu_build.interface.variable_table import TableEntry
+from fmu_build.versions import VERSIONS
 from supervessel.drawing.drawing import drawing, icon
 from supervessel.drawing.figure import svg
 from supervessel.drawing.geometry import assembly
@@ -21,8 +22,8 @@ def documentation(
 
     entries  : the variable table
     evidence : of the choice of law and propagator, where the scene has `[accuracy]`
-    fmi      : version of the FMI standard, 2 or 3. FMI 2.0 has its icon in model.png; from 2.0.4 on it knows
-              the folder terminalsAndIcons too.
+    fmi      : version of the FMI standard, of `versions.VERSIONS`. FMI 2.0 has its icon in
+              model.png; from 2.0.4 on it knows the folder terminalsAndIcons too.
     The icons that terminalsAndIcons.xml names are among the files, the XML file itself is not.
     Raises BuildError if an installed package does not have its licence text where it should be.
     """
@@ -38,6 +39,6 @@ def documentation(
         "terminalsAndIcons/icon.svg": svg(symbol).encode(),
         "terminalsAndIcons/icon.png": symbol_png,
     }
-    if fmi == 2:
-        files["model.png"] = symbol_png
+    if VERSIONS[fmi].icon:
+        files[VERSIONS[fmi].icon] = symbol_png
     return files | licence_files(fmi) | terminal_icons(scene, entries)

@@ -40,7 +40,7 @@ This documentation and the pictures
 def licence_files(fmi: int) -> dict[str, bytes]:
     """Returns the files of documentation/licenses by their place in the archive.
 
-    fmi : version of the FMI standard, 2 or 3: the notice of its headers is packed
+    fmi : version of the FMI standard, of `versions.VERSIONS`: the notice of its headers is packed
     Raises BuildError if an installed package does not have its licence text where it should be.
     """
     texts = {

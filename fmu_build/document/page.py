@@ -16,6 +16,7 @@ from fmu_build.document.accuracy_text import accuracy_text
 from fmu_build.document.rotation_text import energy_and_momentum, law_equation, law_text, what_changes_keep
 from fmu_build.document.tables import Cell, number_text, rounded, table
 from fmu_build.interface.variable_table import Role, TableEntry
+from fmu_build.versions import VERSIONS
 from supervessel.composite.docks import joints, switchable
 from supervessel.drawing.geometry import Assembly
 from supervessel.reference import Composite
@@ -40,12 +41,6 @@ ROLE_TITLES: dict[Role, tuple[str, str]] = {
     "derivative": ("Derivatives", "Rates of the states."),
 }
 
-STATUS = {
-    2: "The answer is Discard where FMI 2.0 allows it (a step; in model exchange a get and the derivatives "
-    "too), else Error.",
-    3: "The answer is Discard.",
-}
-
 
 def page(
     parts: Assembly,
@@ -58,7 +53,7 @@ def page(
 
     parts    : the scene, placed
     entries  : the variable table
-    fmi      : version of the FMI standard, 2 or 3
+    fmi      : version of the FMI standard, of `versions.VERSIONS`
     picture  : the drawing, an svg element
     evidence : of the choice of law and propagator, where the scene has `[accuracy]`
     """
@@ -83,7 +78,7 @@ def page(
         propagator_text=description(scene),
         accuracy="" if evidence is None else accuracy_text(evidence),
         definite="" if rotation.law == "none" else " and positive definite",
-        status=STATUS[fmi],
+        status=VERSIONS[fmi].refusal,
     )
 
 
@@ -99,7 +94,7 @@ def _facts(scene: Scene, fmi: int) -> str:
     """Returns the table of what the scene and the build have set."""
     rotation, experiment = scene.rotation, scene.experiment
     rows: list[tuple[Cell, ...]] = [
-        ("FMI version", f"{fmi}.0"),
+        ("FMI version", VERSIONS[fmi].name),
         ("made by", f"supervessel {version('supervessel')}"),
         ("root vessel", scene.root),
         ("rotation law", rotation.law),

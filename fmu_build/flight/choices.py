@@ -9,6 +9,7 @@ from supervessel.loading import parse_scene
 from supervessel.rotation.propagators import PROPAGATORS, plan_of, stepping
 from supervessel.rotation.propagators.method import Propagator
 from supervessel.scene.inputs import Change, by_name, listed, part_of, vessel_of
+from supervessel.scene.numbers import LEAST_TOLERANCE
 from supervessel.scene.schema import Law, Scene
 
 LAWS_TRIED: tuple[Law, ...] = get_args(Law)
@@ -18,7 +19,7 @@ ANGLES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
 QUICK_ANGLES = (0.01, 0.05, 0.2)
 TOLERANCES = tuple(10.0**-k for k in range(3, 13))
 QUICK_TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)
-FINEST = 1e-15
+FINEST = LEAST_TOLERANCE
 """Tolerance of references."""
 
 SHOWN = ("attitude", "angular_velocity")

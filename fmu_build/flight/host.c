@@ -1,5 +1,6 @@
 /* Flies the library of an FMI 3.0 co-simulation FMU through an experiment, and times that beside a plain RK4 step.
-   Built as a shared library; host.py loads it and the FMU's, and hands the FMU's functions over. */
+   Built as a shared library, with SHOWN and MESSAGE_SIZE of host.py, which loads it and the FMU's and hands the FMU's
+   functions over. */
 #ifndef _WIN32
 #define _POSIX_C_SOURCE 200112L
 #endif
@@ -19,7 +20,7 @@
 #define VISIBLE __attribute__((visibility("default")))
 #endif
 
-enum { SHOWN = 7, CHUNKS = 64, LEAST_ROUNDS = 3, MOST_ROUNDS = 200, PLAIN_STEPS = 2000, MESSAGE_SIZE = 1024 };
+enum { CHUNKS = 64, LEAST_ROUNDS = 3, MOST_ROUNDS = 200, PLAIN_STEPS = 2000 };
 
 /* As ctypes lays them out in host.py. */
 typedef struct {

@@ -20,6 +20,9 @@ FUNCTIONS = (
     "fmi3FreeInstance",
 )
 SHOWN = 7
+"""Numbers that are got after a step: attitude and angular velocity."""
+
+MESSAGE_SIZE = 1024
 
 
 class Flight(ctypes.Structure):
@@ -54,7 +57,7 @@ class Report(ctypes.Structure):
         ("ratio", ctypes.c_double),
         ("sub_steps", ctypes.c_longlong),
         ("failed_at", ctypes.c_double),
-        ("message", ctypes.c_char * 1024),
+        ("message", ctypes.c_char * MESSAGE_SIZE),
     )
 
 

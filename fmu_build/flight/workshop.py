@@ -9,6 +9,7 @@ from xml.etree import ElementTree as ET
 from fmu_build.compile.compiler import FLAGS, TRIAL_FLAGS, compile_library
 from fmu_build.compile.library import compile_sources
 from fmu_build.flight.choices import Choice, variant_of
+from fmu_build.flight.host import MESSAGE_SIZE, SHOWN
 from fmu_build.generate.model import generate
 from fmu_build.generate.sources import source_file_names, source_files
 from fmu_build.platforms import host_platform
@@ -20,6 +21,9 @@ from supervessel.scene.schema import Scene
 from supervessel.shell.processes import Workers
 
 HERE = Path(__file__).parent
+
+HOST_FLAGS = (*FLAGS, f"-DSHOWN={SHOWN}", f"-DMESSAGE_SIZE={MESSAGE_SIZE}")
+"""What host.c is compiled with."""
 
 AT_ONCE = 2
 """Builds at the same time."""
@@ -122,4 +126,4 @@ def host_library(folder: Path) -> Path:
 def _build_host(folder: Path) -> None:
     """Compiles host.c, unless that is done."""
     if not host_library(folder).exists():
-        compile_library([HERE / "host.c"], host_platform(), host_library(folder))
+        compile_library([HERE / "host.c"], host_platform(), host_library(folder), HOST_FLAGS)

@@ -47,6 +47,6 @@ def _dock_rows(model: Equations) -> list[str]:
             flag = model.names.p.index(f"{dock.name}.docked")
             motion = model.names.k.index(f"{dock.name}.velocity[1]")
         names = [vessel_of(name) for name in (one, other)]
-        numbers = f"{vessels[names[0]]}, {vessels[names[1]]}, {flag}, {motion}"
-        rows.append(f'{{"{one}", "{other}", "{names[0]}", "{names[1]}", {numbers}}}')
+        numbers = f"{{{vessels[names[0]]}, {vessels[names[1]]}}}, {flag}, {motion}"
+        rows.append(f'{{{{"{one}", "{other}"}}, {{"{names[0]}", "{names[1]}"}}, {numbers}}}')
     return rows

@@ -19,12 +19,10 @@ OPERATIONS = {
 """What the steps for several vessels at once are made of, C on numbers of type Lanes."""
 
 
-def loop_steps(scene: Scene, has_loop: bool) -> str:
-    """Returns lane_kernels.h; it holds no steps where the composite of a scene is no loop."""
-    if not has_loop:
-        return "/* Generated: this scene has no loop. */\n"
+def loop_steps(scene: Scene) -> str:
+    """Returns lane_kernels.h of a scene whose composite is a loop."""
     return (
-        "/* Generated: steps for several vessels at once; see supervessel/kernels.py. */\n"
+        "/* Generated: steps for several vessels at once; see supervessel/composite/chain.py. */\n"
         '#include "lanes.h"\n\n' + "\n".join(map(_lane_code, lane_kernels(scene)))
     )
 

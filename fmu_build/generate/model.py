@@ -5,22 +5,25 @@ from collections.abc import Sequence
 from fmu_build.generate.change_tables import change_tables
 from fmu_build.generate.equations_source import model_source
 from fmu_build.generate.lane_steps import loop_steps
+from fmu_build.generate.picked_files import picked_files
 from fmu_build.generate.scene_header import scene_header
 from fmu_build.generate.scene_source import scene_source
-from fmu_build.generate.sources import digest, source_file_names, source_files
+from fmu_build.generate.sources import digest, layer_files_of, source_file_names, source_files
 from fmu_build.generate.vessel_loop import loop_functions, loop_source, loop_tables
 from fmu_build.interface.model_description import model_description
 from fmu_build.interface.variable_table import TableEntry, variable_table
+from fmu_build.versions import VERSIONS
 from supervessel.equations import Equations, equations
 from supervessel.scene.schema import Scene
 
 TOKEN_IN_C = 'MODEL_TOKEN[] = "{}"'
-TOKEN_IN_XML = {2: 'guid="{}"', 3: 'instantiationToken="{}"'}
-"""Where the token stands that is made of everything else."""
+"""Where the token stands in C that is made of everything else."""
 
 
 def generate(scene: Scene, fmi: int, model: Equations | None = None) -> tuple[dict[str, str], bytes]:
-    """Returns what is particular to a scene: its C files by name, and modelDescription.xml.
+    """Returns what is particular to a scene: C and H files by name, and modelDescription.xml.
+
+    The files are those generated from the scene and those of the C layer that were picked for it.
 
     model : the scene's equations, if they are there already
     """
@@ -34,16 +37,16 @@ def generated(model: Equations, entries: Sequence[TableEntry], fmi: int) -> tupl
     loop = loop_tables(model)
     functions = model.functions if loop is None else loop_functions(model)
     tables = change_tables(model) + loop_source(loop)
-    sources = {
+    sources = layer_files_of(picked_files(model, loop is not None)) | {
         "model.c": model_source(functions),
         "scene.h": scene_header(model, entries, functions, loop),
         "scene.c": scene_source(entries, "", changing) + tables,
-        "lane_kernels.h": loop_steps(scene, loop is not None),
     }
+    if loop is not None:
+        sources["lane_kernels.h"] = loop_steps(scene)
     names = source_file_names(sources, fmi)
     without_token = model_description(scene, entries, "", fmi, names)
     token = digest(*source_files(sources, fmi, scene.name).values(), without_token)
     sources["scene.c"] = sources["scene.c"].replace(TOKEN_IN_C.format(""), TOKEN_IN_C.format(token))
-    attribute = TOKEN_IN_XML[fmi]
-    with_token = attribute.format(token).encode()
-    return sources, without_token.replace(attribute.format("").encode(), with_token, 1)
+    attribute = VERSIONS[fmi].token
+    return sources, without_token.replace(f'{attribute}=""'.encode(), f'{attribute}="{token}"'.encode(), 1)

@@ -6,23 +6,19 @@ import casadi as ca
 
 from fmu_build.generate.change_tables import change_constants
 from fmu_build.generate.vessel_loop import Tables, loop_constants
+from fmu_build.interface.model_description import LOG_CATEGORIES
 from fmu_build.interface.variable_table import TableEntry
 from supervessel.equations import Equations
 from supervessel.rotation.propagators.free_motion import FIRST_ANGLE, LARGEST_TURN
+from supervessel.rotation.propagators.taylor import (
+    HALF_ORDER_AT_1,
+    HALF_ORDER_SLOPE,
+    LEAST_ORDER,
+    MOST_ORDER,
+)
 from supervessel.rotation.propagators.theta import CONSTANTS
-from supervessel.scene.schema import Scene
-
-CHOICES = {
-    "STEPS_NONE": 0,
-    "STEPS_BY_ANGLE": 1,
-    "STEPS_BY_ERROR": 2,
-    "STEPS_BY_SERIES": 3,
-    "FREE_NEVER": 0,
-    "FREE_ALWAYS": 1,
-    "FREE_BETWEEN_KICKS": 2,
-    "FREE_WHILE_FREE": 3,
-}
-"""What the C layer compiles for a plan (`supervessel.rotation.propagators`), as the preprocessor sees it."""
+from supervessel.scene.numbers import LARGEST_TOLERANCE, LEAST_TOLERANCE, TRIANGLE_SLACK
+from supervessel.scene.schema import PARALLEL_LIMIT, Scene
 
 
 def scene_header(
@@ -56,9 +52,9 @@ def scene_header(
         "/* Generated: what the C layer must know of the scene. */\n"
         "#ifndef SCENE_H\n#define SCENE_H\n\n"
         f"enum {{\n{_lines('    {} = {},', constants)}\n}};\n\n"
-        "/* What bounds a step, and when free motion is used. */\n"
-        f"{_lines('#define {} {}', CHOICES)}\n\n"
         f"{_lines('#define {} {}', macros)}\n\n"
+        "/* The same for every scene. */\n"
+        f"{_lines('#define {} {}', COMMON)}\n\n"
         "#endif\n"
     )
 
@@ -83,6 +79,7 @@ def _variables(model: Equations, entries: Sequence[TableEntry]) -> dict[str, int
         "REFERENCE_STATES": references["state.attitude[1]"],
         "REFERENCE_DERIVATIVES": references["der(state.attitude[1])"],
         "STATE_COUNT": len(model.names.z),
+        "PORT_COUNT": len(model.resolved.scene.inputs.pose),
     }
 
 
@@ -95,7 +92,7 @@ def _axes_and_free_motion(model: Equations) -> dict[str, int]:
         "AXES_SERIES": axes["series"].start if "series" in axes else 0,
         "FREE_VARYING": begun[0].numel_out(0) if begun else 0,
         "FREE_CONSTANT": begun[0].numel_out(1) if begun else 0,
-        "FREE_START": CONSTANTS,
+        "FREE_START": CONSTANTS if model.plan.free in ("always", "while free") else 1,
     }
 
 
@@ -130,11 +127,10 @@ def _work_arrays(functions: Iterable[ca.Function], loop: Tables | None) -> dict[
 
 
 def _plan(model: Equations) -> dict[str, object]:
-    """Returns the method of co-simulation: what controls its steps, when motion is free, its numbers."""
+    """Returns numbers of the method of co-simulation, and whether a tolerance controls its steps."""
     method = model.plan.method
     return {
-        "STEPS": f"STEPS_BY_{method.control.upper()}" if method else "STEPS_NONE",
-        "FREE": f"FREE_{model.plan.free.upper().replace(' ', '_')}",
+        "ERROR_CONTROLLED": int(method is not None and method.control != "angle"),
         "ERROR_EXPONENT": model.steps.error_exponent,
         "SAFETY": repr(method.safety if method else 1.0),
         "PRODUCT_COUNT": model.product_count,
@@ -142,14 +138,31 @@ def _plan(model: Equations) -> dict[str, object]:
 
 
 def _limits(scene: Scene) -> dict[str, str]:
-    """Returns the limits that steps and free motion keep to."""
+    """Returns the limits that steps keep to."""
     rotation = scene.rotation
     return {
         "TOLERANCE": repr(rotation.tolerance),
         "MAX_ANGLE_STEP": f"{rotation.max_angle_step!r} /* largest angle of a sub-step [rad] */",
-        "FIRST_ANGLE": f"{FIRST_ANGLE!r} /* up to which free motion is a series [rad] */",
-        "LARGEST_TURN": f"{LARGEST_TURN!r} /* up to which free motion is followed [rad] */",
     }
+
+
+COMMON = {
+    "FIRST_ANGLE": f"{FIRST_ANGLE!r} /* up to which free motion is a series [rad] */",
+    "LARGEST_TURN": f"{LARGEST_TURN!r} /* up to which free motion is followed [rad] */",
+    "TRIANGLE_SLACK": f"{TRIANGLE_SLACK!r} /* of a sum of two moments beside the third, relative */",
+    "PARALLEL_LIMIT": f"{PARALLEL_LIMIT!r} /* least angle of alignment and direction [rad] */",
+    "LEAST_TOLERANCE": repr(LEAST_TOLERANCE),
+    "LARGEST_TOLERANCE": repr(LARGEST_TOLERANCE),
+    "TAYLOR_LEAST_ORDER": LEAST_ORDER,
+    "TAYLOR_MOST_ORDER": MOST_ORDER,
+    "TAYLOR_HALF_ORDER_AT_1": repr(HALF_ORDER_AT_1),
+    "TAYLOR_HALF_ORDER_SLOPE": repr(HALF_ORDER_SLOPE),
+    **{
+        f"LOG_NAME_{name.removeprefix('log').removeprefix('Status').upper()}": f'"{name}"'
+        for name in LOG_CATEGORIES
+    },
+}
+"""Macros for what Python and the C layer share, which stands nowhere else."""
 
 
 def _lines(form: str, values: Mapping[str, object]) -> str:

@@ -13,13 +13,12 @@ def scene_source(entries: Sequence[TableEntry], token: str, changing: bool) -> s
     changing : whether a change of inputs changes the states
     """
     needs = {entry.reference: _needs(entry, changing) for entry in entries}
-    typed = any(entry.variable.boolean for entry in entries)
-    rows = "\n".join(f"    {_row(entry, needs, typed)}," for entry in entries)
+    rows = "\n".join(f"    {_row(entry, needs)}," for entry in entries)
     checks = [(entry.reference, check) for entry in entries if (check := _check(entry)) != "CHECK_NONE"]
     judged = "\n".join(f"    {{{reference}, {check}}}," for reference, check in [*checks, (0, "CHECK_NONE")])
     return (
         "/* Generated: the scene's variables, by value reference. */\n"
-        '#include "changes.h"\n\n'
+        '#include "docks.h"\n\n'
         f"const Variable VARIABLES[VARIABLE_COUNT] = {{\n{rows}\n}};\n\n"
         f"const Judged JUDGED[] = {{\n{judged}\n}};\n\n"
         f'const char MODEL_TOKEN[] = "{token}";\n'
@@ -45,11 +44,10 @@ def _shows_axes(variable: Variable) -> bool:
     return isinstance(variable, OutputVariable) and variable.kind.axes
 
 
-def _row(entry: TableEntry, needs: Mapping[int, frozenset[str]], typed: bool) -> str:
+def _row(entry: TableEntry, needs: Mapping[int, frozenset[str]]) -> str:
     """Returns a row of the table.
 
     needs : by value reference, what `_needs` returns of each variable
-    typed : whether there are variables of more than one type
     """
     variable = entry.variable
     own = {
@@ -65,9 +63,8 @@ def _row(entry: TableEntry, needs: Mapping[int, frozenset[str]], typed: bool) ->
         repr(variable.nominal),
         f"ROLE_{entry.role.upper()}",
         " | ".join(f"FOLLOWS_{flag}" for flag in flags) or "0",
+        "TYPE_BOOLEAN" if variable.boolean else "TYPE_NUMBER",
     ]
-    if typed:
-        fields.append("TYPE_BOOLEAN" if variable.boolean else "TYPE_NUMBER")
     return "{" + ", ".join(fields) + "}"
 
 

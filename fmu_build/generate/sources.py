@@ -7,15 +7,15 @@ are the importer's own.
 
 import hashlib
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-LAYER = Path(__file__).parents[1] / "c"
-"""The scene-independent C."""
+from fmu_build.generate.picked_files import is_picked
+from fmu_build.versions import VERSIONS
 
-OTHER_VERSION = {2: "fmi3", 3: "fmi2"}
-"""Beginning of the names of the layer's files that belong to the other version of FMI."""
+LAYER = Path(__file__).parents[1] / "c"
+"""The C layer: files whose text is the same for every scene."""
 
 NEEDS_LIBM = ("aarch64-linux", "x86_64-linux")
 """Platforms where sqrt, ceil and the like are in a library of their own."""
@@ -53,18 +53,31 @@ CASADI_NAME = re.compile(r"^#define (casadi_\w+) CASADI_PREFIX\((\w+)\)$", re.MU
 
 
 def layer_files(fmi: int) -> dict[str, str]:
-    """Returns the scene-independent C and H files for an FMI version, by name."""
+    """Returns the C and H files of the layer that every FMU of an FMI version has, by name."""
+    others = tuple(f"fmi{number}" for number in VERSIONS if number != fmi)
     return {
         path.name: path.read_text(encoding="utf-8")
         for path in sorted(LAYER.glob("*.[ch]"))
-        if not path.name.startswith(OTHER_VERSION[fmi])
+        if not (is_picked(path.name) or path.name.startswith(others))
+    }
+
+
+def layer_files_of(names: Container[str]) -> dict[str, str]:
+    """Returns the C and H files of the layer that an FMU has beside those of `layer_files`, by name.
+
+    names : without .c and .h, see `picked_files`
+    """
+    return {
+        path.name: path.read_text(encoding="utf-8")
+        for path in sorted(LAYER.glob("*.[ch]"))
+        if path.stem in names and is_picked(path.name)
     }
 
 
 def source_file_names(scene_sources: Iterable[str], fmi: int) -> list[str]:
     """Returns the names of the C files to compile, in the folder sources/.
 
-    scene_sources : names of the scene's own C and H files
+    scene_sources : names of the scene's own C and H files, and of those of the layer that were picked for it
     """
     return sorted(name for name in {*scene_sources, *layer_files(fmi)} if name.endswith(".c"))
 
@@ -72,7 +85,7 @@ def source_file_names(scene_sources: Iterable[str], fmi: int) -> list[str]:
 def source_files(scene_sources: Mapping[str, str], fmi: int, model_identifier: str) -> dict[str, bytes]:
     """Returns the content of the archive's folder sources/, by archive path.
 
-    scene_sources    : the scene's own C and H files by name
+    scene_sources    : by name, the scene's own C and H files and those of the layer that were picked for it
     fmi              : version of the FMI standard; FMI 3.0 has a buildDescription.xml among the files,
                        FMI 2.0 lists `source_file_names` in modelDescription.xml
     model_identifier : the FMU's modelIdentifier
@@ -83,7 +96,7 @@ def source_files(scene_sources: Mapping[str, str], fmi: int, model_identifier: s
     for name in names:
         texts[name] = '#include "prelude.h"\n' + texts[name]
     texts["prelude.h"] = _prelude(external, model_identifier)
-    if fmi == 3:
+    if not VERSIONS[fmi].lists_sources:
         texts["buildDescription.xml"] = _build_description(model_identifier, names)
     return {f"sources/{name}": texts[name].encode() for name in sorted(texts)}
 

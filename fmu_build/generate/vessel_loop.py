@@ -1,4 +1,4 @@
-"""C tables of the composite of many moving vessels, which a loop in C puts together: fmu_build/c/loop.c."""
+"""C tables of the composite of many moving vessels, which fmu_build/c/vessel_loop.c puts together."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,6 +20,9 @@ LONGEST_CODE = 2000
 
 LANES = 2
 """Bodies that are seen at once: doubles in the registers that every x86_64 and every aarch64 has."""
+
+POSE, PORT, SEEN = 12, 9, 9
+"""Numbers of a pose (rotation and origin), a port, and a body as it is seen (centre and inertia)."""
 
 NOWHERE = "{1, 0}"
 """LoopPlace of zeros: LOOP_HELD begins with them."""
@@ -62,7 +65,7 @@ class Tables:
     def work(self) -> int:
         """Numbers that the loop needs for values and their changes."""
         frames, bodies = len(self.frames), len(self.bodies)
-        return 12 * (2 * frames + 2 * LANES) + 19 * bodies + 3 + 2 * (4 + 3 + 6)
+        return POSE * (2 * frames + 2 * LANES) + (2 * SEEN + 1) * bodies + 3 + 2 * (4 + 3 + 6)
 
 
 @dataclass(frozen=True)
@@ -150,9 +153,9 @@ def _fill_up(tables: Tables) -> None:
 
 
 def _pose_at(frame: int) -> int:
-    """Returns where the pose of a frame stands; see `pose_at` in loop.c."""
+    """Returns where the pose of a frame stands; see `pose_at` in vessel_loop.c."""
     block, lane = divmod(frame + LANES - 1, LANES)
-    return 12 * LANES * block + lane
+    return POSE * LANES * block + lane
 
 
 def _port(loop: LoopScene, name: str, tables: Tables) -> str:
@@ -232,11 +235,13 @@ def loop_functions(model: Equations) -> list[ca.Function]:
 def loop_constants(tables: Tables | None) -> dict[str, int]:
     """Returns what the C layer must know of a loop, by name of the macro."""
     if tables is None:
-        return {"LOOP": 0}
+        return {}
     return {
-        "LOOP": 1,
         "LOOP_LANES": LANES,
         "LOOP_BLOCK": LANES,
+        "LOOP_POSE": POSE,
+        "LOOP_PORT": PORT,
+        "LOOP_SEEN": SEEN,
         "LOOP_FRAME_COUNT": len(tables.frames),
         "LOOP_BODY_COUNT": len(tables.bodies),
         "LOOP_WORK": tables.work,
@@ -249,7 +254,7 @@ def loop_source(tables: Tables | None) -> str:
         return ""
     bodies = _body_rows(tables)
     return (
-        '\n#include "loop.h"\n\n'
+        '\n#include "vessel_loop.h"\n\n'
         + _array("LoopFrame LOOP_FRAMES", tables.frames)
         + _array("LoopBody LOOP_BODIES", bodies)
         + _array("double LOOP_HELD", [repr(number) for number in tables.held])

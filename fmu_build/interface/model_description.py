@@ -1,12 +1,13 @@
 """modelDescription.xml for FMI 2.0 and FMI 3.0, written from the variable table."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from xml.etree import ElementTree as ET
 
 from fmu_build.interface.units import UNITS, add_types, add_units
 from fmu_build.interface.variable_table import Dependency, Role, TableEntry
 from fmu_build.interface.xml_text import xml_text
+from fmu_build.versions import VERSIONS, Version
 from supervessel.scene.schema import Scene
 
 LOG_CATEGORIES = {
@@ -15,6 +16,7 @@ LOG_CATEGORIES = {
     "logComposite": "the composite was computed because one of its inputs changed",
     "logAll": "all of these",
 }
+"""Names of the categories of log messages, and what each tells."""
 
 ROLES: dict[Role, dict[str, str]] = {
     "time": {"causality": "independent", "variability": "continuous"},
@@ -55,25 +57,25 @@ def model_description(
 
     entries : the variable table
     token   : instantiation token, the same that is compiled into the library
-    fmi     : 2 or 3
+    fmi     : number of the version, of VERSIONS
     sources : names of the C files in sources/, which FMI 2.0 lists here
     """
-    root = _fmi3(scene, entries, token) if fmi == 3 else _fmi2(scene, entries, token, sources)
+    version_of_fmi = VERSIONS[fmi]
+    root = _header(scene, version_of_fmi, token)
+    WRITERS[fmi](root, scene, entries, sources if version_of_fmi.lists_sources else ())
     return xml_text(root)
 
 
-def _header(scene: Scene, fmi_version: str, token_attribute: str, token: str) -> ET.Element:
+def _header(scene: Scene, fmi: Version, token: str) -> ET.Element:
     """Returns the root element."""
     attributes = {
-        "fmiVersion": fmi_version,
+        "fmiVersion": fmi.name,
         "modelName": scene.name,
-        token_attribute: token,
+        fmi.token: token,
         "description": _description(scene),
         "generationTool": f"supervessel {version('supervessel')}",
         "variableNamingConvention": "structured",
     }
-    if fmi_version == "2.0":
-        attributes["numberOfEventIndicators"] = "0"
     return ET.Element("fmiModelDescription", attributes)
 
 
@@ -87,14 +89,12 @@ def _description(scene: Scene) -> str:
     return f"Rotation of {scene.root}{docked}, law {scene.rotation.law}"
 
 
-def _fmi3(scene: Scene, entries: Sequence[TableEntry], token: str) -> ET.Element:
-    """Returns the model description of FMI 3.0."""
-    root = _header(scene, "3.0", "instantiationToken", token)
+def _fmi3(root: ET.Element, scene: Scene, entries: Sequence[TableEntry], _: Sequence[str]) -> None:
+    """Writes the model description of FMI 3.0."""
     _interfaces3(root, scene)
     _definitions(root, scene, entries, "Float64Type")
     _variables3(root, entries)
     _structure3(root, entries)
-    return root
 
 
 def _interfaces3(root: ET.Element, scene: Scene) -> None:
@@ -143,14 +143,13 @@ def _unknown3(
     ET.SubElement(structure, name, attributes)
 
 
-def _fmi2(scene: Scene, entries: Sequence[TableEntry], token: str, sources: Sequence[str]) -> ET.Element:
-    """Returns the model description of FMI 2.0, which counts variables from 1."""
-    root = _header(scene, "2.0", "guid", token)
+def _fmi2(root: ET.Element, scene: Scene, entries: Sequence[TableEntry], sources: Sequence[str]) -> None:
+    """Writes the model description of FMI 2.0, which counts variables from 1."""
+    root.set("numberOfEventIndicators", "0")
     _interfaces2(root, scene, sources)
     _definitions(root, scene, entries, "SimpleType")
     _variables2(root, entries)
     _structure2(root, entries)
-    return root
 
 
 def _interfaces2(root: ET.Element, scene: Scene, sources: Sequence[str]) -> None:
@@ -262,3 +261,10 @@ def _type_attributes(entry: TableEntry) -> dict[str, str]:
     if variable.nominal != 1.0:
         numbers["nominal"] = variable.nominal
     return attributes | {name: repr(number) for name, number in numbers.items() if number is not None}
+
+
+WRITERS: dict[int, Callable[[ET.Element, Scene, Sequence[TableEntry], Sequence[str]], None]] = {
+    2: _fmi2,
+    3: _fmi3,
+}
+"""By number of the version: writes what stands in the root element. The last argument: C files to list."""

@@ -10,14 +10,12 @@ from xml.etree import ElementTree as ET
 
 from fmu_build.interface.variable_table import TableEntry
 from fmu_build.interface.xml_text import xml_text
+from fmu_build.versions import VERSIONS
 from supervessel.drawing.figure import Figure, Item, Path, arrow, regular_polygon, svg
 from supervessel.drawing.raster import png
 from supervessel.scene.inputs import vessel_of
 from supervessel.scene.schema import Scene
 from supervessel.scene.variables import InputVariable
-
-FILE_VERSION = {2: "3.0", 3: "3.0"}
-"""The file's fmiVersion by that of the FMU: the version that defines the file."""
 
 ICON_EXTENT = 100.0
 """The FMU's icon fills the square from -100 to 100, the coordinates that FMI takes by default."""
@@ -115,9 +113,9 @@ def terminals_and_icons(scene: Scene, entries: Sequence[TableEntry], fmi: int) -
     """Returns the text of terminalsAndIcons/terminalsAndIcons.xml.
 
     entries : the variable table
-    fmi     : version of the FMU, 2 or 3
+    fmi     : version of the FMU, of `versions.VERSIONS`
     """
-    root = ET.Element("fmiTerminalsAndIcons", fmiVersion=FILE_VERSION[fmi])
+    root = ET.Element("fmiTerminalsAndIcons", fmiVersion=VERSIONS[fmi].terminals)
     graphics = ET.SubElement(root, "GraphicalRepresentation")
     extent = {"x1": -ICON_EXTENT, "y1": -ICON_EXTENT, "x2": ICON_EXTENT, "y2": ICON_EXTENT}
     corners = {name: repr(value) for name, value in extent.items()}

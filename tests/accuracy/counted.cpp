@@ -1,4 +1,4 @@
-/* Runs fmu_build/c/taylor.c with numbers that count what is done to them: slow operations as five. */
+/* Runs fmu_build/c/taylor_series.c with numbers that count what is done to them: slow operations as five. */
 #include <math.h>
 #include <stddef.h>
 
@@ -25,7 +25,7 @@ static bool operator>(Counted a, Counted b) { return a.value > b.value; }
 static Counted sqrt(Counted a) { return did(::sqrt(a.value), 5); }
 
 #define double Counted
-#include "taylor.c"
+#include "taylor_series.c"
 
 /* Returns what a sub-step takes. */
 extern "C" __attribute__((visibility("default"))) long counted(int order) {

@@ -11,6 +11,7 @@ from fmu_build.accuracy.cost import free_operations, free_spans, operations, ser
 from fmu_build.compile.compiler import TRIAL_FLAGS, compile_library
 from fmu_build.generate.sources import LAYER
 from fmu_build.platforms import host_platform
+from supervessel.rotation.propagators.taylor import MOST_ORDER
 
 HERE = Path(__file__).parent
 
@@ -27,12 +28,12 @@ FLAGS = (
     ("product_count", "gyroscopic", "turned"), [(0, False, False), (3, True, False), (9, True, True)]
 )
 def test_operations_of_a_series_are_those_of_its_loop_in_c(tmp_path, product_count, gyroscopic, turned):
-    """taylor.c, run with numbers that count; both are quadratic in the order: five points prove it."""
-    for name in ("taylor.c", "taylor.h"):
+    """taylor_series.c, run with numbers that count; both are quadratic in the order: five points prove it."""
+    for name in ("taylor_series.c", "taylor_series.h"):
         shutil.copy(LAYER / name, tmp_path)
     shutil.copy(HERE / "counted.cpp", tmp_path)
     (tmp_path / "scene.h").write_text(
-        f"#define STEPS 3\n#define STEPS_BY_SERIES 3\n#define PRODUCT_COUNT {product_count}\n"
+        f"#define PRODUCT_COUNT {product_count}\n#define TAYLOR_MOST_ORDER {MOST_ORDER}\n"
     )
     platform = host_platform()
     library = tmp_path / f"counted{platform.suffix}"

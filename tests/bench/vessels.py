@@ -57,7 +57,7 @@ def compiled(scene: Scene, folder: Path) -> tuple[Path, dict[str, int]]:
     """Returns the library of a scene's generated C, its functions visible, and the counts of its header."""
     counts = written(scene, folder)
     library = folder / f"scene{host_platform().suffix}"
-    sources = [Path(name) for name in ("loop.c", "model.c", "scene.c")]
+    sources = [Path(name) for name in ("vessel_loop.c", "model.c", "scene.c")]
     compile_library(sources, host_platform(), library, VISIBLE, folder)
     return library, counts
 

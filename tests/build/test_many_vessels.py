@@ -61,7 +61,7 @@ class Compiled:
             (folder / Path(path).name).write_bytes(for_lanes)
         self.work = int(_constant((folder / "scene.h").read_text(), "WORK_REAL"))
         library = folder / f"scene{host_platform().suffix}"
-        sources = [Path(name) for name in ("loop.c", "model.c", "scene.c")]
+        sources = [Path(name) for name in ("vessel_loop.c", "model.c", "scene.c")]
         compile_library(sources, host_platform(), library, VISIBLE, folder)
         self.library = ctypes.CDLL(str(library))
 

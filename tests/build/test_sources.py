@@ -7,6 +7,7 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import numpy as np
@@ -15,9 +16,14 @@ from fmpy.model_description import read_build_description, read_model_descriptio
 from lxml import etree
 
 from fmu_build.compile.compiler import fmi_headers
-from fmu_build.generate.sources import layer_files, source_file_names, source_files
+from fmu_build.generate.model import generate
+from fmu_build.generate.picked_files import PICKED
+from fmu_build.generate.picked_files import STEPS as OF_STEPS
+from fmu_build.generate.sources import LAYER, layer_files, source_file_names, source_files
 from fmu_build.storage.cache import cache_folder
-from support import ISS_DG, body, built
+from supervessel.rotation.propagators import PROPAGATORS
+from support import ISS_DG, body, built, scene, variant
+from support.costs import station
 from support.marks import FMI
 
 STEP, STEPS = 0.1, 100
@@ -138,6 +144,47 @@ def test_generated_files_do_not_hide_those_of_the_layer(fmi):
     files = packed_sources(fmi)
     for name, text in layer_files(fmi).items():
         assert files[name].endswith(text)
+
+
+SCENES = {
+    "exact": body(propagator="exact") | {"inputs": {"torque": False}},
+    **{name: body(propagator=name) for name in PROPAGATORS if name != "exact"},
+    "auto": variant(ISS_DG, {"rotation.propagator": "auto"}),
+    "momentum kept by masses": variant(ISS_DG, {"rotation.mass_change": "momentum"}),
+    "momentum kept": variant(ISS_DG, {"rotation": {"mass_change": "momentum", "pose_change": "momentum"}}),
+    "docks": variant(
+        ISS_DG,
+        {
+            "docks": [{"ports": ["ISS.P2", "DG.nose"], "name": "berth", "docked": False}],
+            "inputs": {"docked": ["berth"]},
+        },
+    ),
+    "many vessels": station(60, [f"v{i}" for i in range(60)]),
+}
+
+
+def picked(raw: dict[str, Any]) -> set[str]:
+    """Returns the files of PICKED, without .c and .h, that a scene's FMU has."""
+    return {name.partition(".")[0] for name in generate(scene(raw), 3)[0]} & PICKED
+
+
+def test_every_file_that_only_some_scenes_need_is_there_and_in_some_fmu():
+    assert {path.stem for path in LAYER.glob("*.[ch]")} > PICKED
+    assert set().union(*map(picked, SCENES.values())) == PICKED
+
+
+def test_an_fmu_holds_the_sub_steps_of_its_own_propagator_alone():
+    assert picked(SCENES["rk4"]) & OF_STEPS == {"rk4", "every_step"}
+    assert picked(SCENES["dop853"]) & OF_STEPS == {"dop853", "tried_steps", "estimated_steps", "every_step"}
+    assert picked(SCENES["exact"]) & OF_STEPS == {"exact", "free_step", "free_motion"}
+
+
+@pytest.mark.parametrize("path", sorted(LAYER.glob("*.[ch]")), ids=lambda path: path.name)
+def test_a_file_of_the_layer_opens_with_its_subject_and_names_only_python_that_is_there(path):
+    text, root = path.read_text(encoding="utf-8"), LAYER.parents[1]
+    assert re.match(r"/\* [A-Z]", text)
+    for name in re.findall(r"[\w/]+\.py\b", text):
+        assert (root / name).is_file() or (root / "model" / name).is_file(), name
 
 
 @FMI

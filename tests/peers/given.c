@@ -1,5 +1,5 @@
 /* The composite of a scene whose vessels' poses are given: the loop without the ports, on poses placed once. */
-#include "loop.c"
+#include "vessel_loop.c"
 
 #include "plain.h"
 

@@ -6,12 +6,12 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
-from fmu_build.compile.compiler import FLAGS, compile_library
+from fmu_build.compile.compiler import compile_library
 from fmu_build.flight.choices import BEST, Choice, Model, models, reference_choices, variant_of
 from fmu_build.flight.experiment import course_of
 from fmu_build.flight.flying import fly_all
 from fmu_build.flight.results import keep, place_of, read
-from fmu_build.flight.workshop import HERE
+from fmu_build.flight.workshop import HERE, HOST_FLAGS
 from fmu_build.platforms import host_platform
 from supervessel import parse_scene
 from support import ISS_DG, OK, Instance, variant
@@ -177,4 +177,4 @@ def test_the_host_has_no_variables_but_where_its_libraries_are(shop, monkeypatch
 def test_the_host_compiles_without_warnings(tmp_path):
     strict = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wstrict-prototypes", "-Werror")
     platform = host_platform()
-    compile_library([HERE / "host.c"], platform, tmp_path / f"host{platform.suffix}", (*FLAGS, *strict))
+    compile_library([HERE / "host.c"], platform, tmp_path / f"host{platform.suffix}", (*HOST_FLAGS, *strict))

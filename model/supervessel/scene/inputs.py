@@ -21,7 +21,7 @@ Owner = Literal["vessel", "port", "dock", "point", ""]
 """What the list of a scene names; "": the whole assembly, the key is then true or false."""
 
 Judge = Literal["MASS", "PMI", "PORT", ""]
-"""How the FMU judges the values of an owner together; see CHECK_... in fmu_build/c/variables.h."""
+"""How the FMU judges the values of an owner together; see CHECK_... in fmu_build/c/variable_table.h."""
 
 Values = tuple[float, ...]
 

@@ -17,6 +17,8 @@ EPSILON = 2.0**-52
 # k1 + k2 >= k3 is judged on decimals read from text: each is off by u = EPSILON/2 relative, the sum by one
 # u more, so a body on the boundary shows an excess of up to 4 u k3.
 TRIANGLE_SLACK = 2.0 * EPSILON
+# What a controlled error may be asked to be; less is below what doubles tell.
+LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-15, 0.1
 # Eigenvalues of a symmetric 3x3 matrix are computed to a few u of the largest one.
 EIGENVALUE_SLACK = 16.0 * EPSILON
 
@@ -165,7 +167,12 @@ Seconds = Annotated[float, number("s", "a finite number > 0", 0.0, open_low=True
 Angle = Annotated[float, number("rad", "a number from 1e-6 to 1", 1e-6, 1.0)]
 AttitudeError = Annotated[float, number("rad", "a number from 1e-15, what doubles tell, to 1", 1e-15, 1.0)]
 RateError = Annotated[float, number("rad/s", "a finite number > 0", 0.0, open_low=True)]
-Tolerance = Annotated[float, number("", "a number from 1e-15 to 0.1", 1e-15, 0.1)]
+Tolerance = Annotated[
+    float,
+    number(
+        "", f"a number from {LEAST_TOLERANCE:g} to {LARGEST_TOLERANCE:g}", LEAST_TOLERANCE, LARGEST_TOLERANCE
+    ),
+]
 Course = Annotated[tuple[tuple[float, float | bool], ...], BeforeValidator(_course)]
 Bounds = Annotated[tuple[float, float], vector("", "two finite numbers [low, high]", size=2)]
 

@@ -13,7 +13,7 @@
 #include <string.h>
 
 #include "prelude.h"
-#include "variables.h"
+#include "variable_table.h"
 
 #if FMI == 3
 #include "fmi3Functions.h"

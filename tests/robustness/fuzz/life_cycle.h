@@ -116,7 +116,7 @@ static Answer enter(Slot *slot) {
     const double stop = once_in(8) ? no_number() : start + uniform(-1.0, 1e3);
     const bool given = once_in(2);
     const double tolerance = once_in(20) ? odd_number() : pow(10.0, uniform(-15.0, -1.0));
-    const bool used = given && STEPS >= STEPS_BY_ERROR && !slot->exchange;
+    const bool used = given && ERROR_CONTROLLED && !slot->exchange;
     const bool right =
         isfinite(start) && (!stops || stop >= start) && (!used || (tolerance >= 1e-15 && tolerance <= 0.1));
     Answer answer = {OK, expect(slot, INSTANTIATED, right)};

@@ -24,6 +24,15 @@ PROPAGATORS: dict[str, Propagator] = {
 """The methods; "auto" is a plan made of them."""
 
 
+WHEN_FREE: dict[str, str] = {
+    "never": "every_step",
+    "always": "exact",
+    "between kicks": "every_step",
+    "while free": "while_free",
+}
+"""The file of fmu_build/c that asks whether a step is free motion, by `Plan.free`, without .c."""
+
+
 @dataclass(frozen=True)
 class Plan:
     """What a scene's co-simulation uses.
@@ -35,6 +44,13 @@ class Plan:
 
     method: Propagator | None
     free: str
+
+    @property
+    def c_files(self) -> frozenset[str]:
+        """Names, without .c and .h, of the files of fmu_build/c that this plan needs and others may not."""
+        own = self.method.c_files if self.method else ()
+        exact = PROPAGATORS["exact"].c_files if self.free in ("always", "while free") else ()
+        return frozenset({*own, *exact, WHEN_FREE[self.free]})
 
 
 def plan_of(scene: "Scene") -> Plan:

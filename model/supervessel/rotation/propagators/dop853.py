@@ -135,6 +135,7 @@ PROPAGATOR = Propagator(
     "never",
     "The Runge-Kutta method DOP853 of order 8 ([HNW], code DOP853). A communication step is divided so that "
     "the estimated error of the attitude at its end stays below <code>tolerance</code>.",
+    c_files=("dop853", "tried_steps", "estimated_steps"),
     marker="s",
     safety=5.0,
 )

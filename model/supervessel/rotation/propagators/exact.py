@@ -93,6 +93,7 @@ PROPAGATOR = Propagator(
     "Free motion in one step of any length, from the last instant at which torque or inertia changed in "
     "value, by addition theorems of Jacobi's elliptic functions, or by theta functions where a second step "
     "goes on from there ([VS], [F]). Knows no torque.",
+    c_files=("free_step", "free_motion"),
     marker="P",
     setting="",
 )

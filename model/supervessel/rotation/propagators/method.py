@@ -73,9 +73,10 @@ class Propagator:
 
     build   : one step of it; None: it has no other step than free motion
     control : what bounds a step: the angle that the body turns, or the estimated error; of a "series" too,
-              whose steps C takes by a loop of its own (fmu_build/c/taylor.c)
+              whose steps C takes by a loop of its own
     free    : when it uses exact free motion
     text    : what it does, HTML
+    c_files : names, without .c and .h, of the files of fmu_build/c that an FMU has for it
     marker  : of its points in plots, as matplotlib names it
     setting : what sets its steps
     suits   : rotation law and table `[inputs]` -> why it makes no sense with them, "" where it does
@@ -87,6 +88,7 @@ class Propagator:
     control: Control
     free: Free
     text: str
+    c_files: tuple[str, ...]
     marker: str
     setting: Setting = "tolerance"
     suits: Callable[[str, Mapping[str, Any]], str] = suits_any

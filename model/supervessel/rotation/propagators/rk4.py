@@ -43,6 +43,7 @@ PROPAGATOR = Propagator(
     "The classical Runge-Kutta method of order 4 ([HNW] section II.1) for attitude and angular velocity "
     "jointly. A communication step is divided so that the body surely turns by no more than "
     "<code>max_angle_step</code> in a sub-step, spin-up by torque included.",
+    c_files=("rk4",),
     marker="o",
     setting="max_angle_step",
 )

@@ -47,6 +47,7 @@ PROPAGATOR = Propagator(
     "Half of the torque's change of angular velocity, exact free motion over the step, the other half "
     "([HLW] section II.5). The steps keep an a-priori bound of the error within the tolerance; they are not "
     "limited by how fast the body turns, only by how strong the torque is.",
+    c_files=("split", "tried_steps", "estimated_steps", "free_motion"),
     marker="v",
     suits=_suits,
 )

@@ -12,6 +12,8 @@ from supervessel.rotation.laws import RotationLaw
 from supervessel.rotation.propagators.method import STILL_PARTS, Propagator, Step, StepSymbols
 
 LEAST_ORDER, MOST_ORDER = 6, 20
+HALF_ORDER_AT_1, HALF_ORDER_SLOPE = 2.75, 0.29
+"""Half the order at a tolerance of 1 rad, before it is rounded down, and what it gains per factor e less."""
 
 Coefficients = Sequence[Sequence[ca.SX]]
 """Of s^0, s^1, and so on, the components of each."""
@@ -24,7 +26,7 @@ def taylor_order(tolerance: float) -> int:
     least near P = 1 - ln(tolerance)/2 ([JZ]). What each coefficient costs besides puts it higher: measured
     (`make bench`), to the nearest even number, P = 4.5 - 0.58 ln(tolerance).
     """
-    order = 2 * floor(2.75 - 0.29 * log(tolerance))
+    order = 2 * floor(HALF_ORDER_AT_1 - HALF_ORDER_SLOPE * log(tolerance))
     return min(max(order, LEAST_ORDER), MOST_ORDER)
 
 
@@ -159,9 +161,10 @@ PROPAGATOR = Propagator(
     build,
     "series",
     "never",
-    "Taylor series of attitude and angular velocity ([JZ]), of an order from 6 to 20 that suits the "
-    "tolerance. A communication step is divided so that the estimated error of the attitude at its end stays "
-    "below <code>tolerance</code>.",
+    f"Taylor series of attitude and angular velocity ([JZ]), of an order from {LEAST_ORDER} to {MOST_ORDER} "
+    "that suits the tolerance. A communication step is divided so that the estimated error of the attitude "
+    "at its end stays below <code>tolerance</code>.",
+    c_files=("taylor", "taylor_series", "estimated_steps"),
     marker="D",
     suits=_suits,
     safety=2.5,

@@ -1,6 +1,6 @@
 /* The composite of a scene of many moving vessels, put together by a loop: tables of what stands where. */
-#ifndef LOOP_H
-#define LOOP_H
+#ifndef VESSEL_LOOP_H
+#define VESSEL_LOOP_H
 
 #include "scene.h"
 

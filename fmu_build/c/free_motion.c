@@ -1,12 +1,13 @@
-#include <float.h>
-#include <math.h>
-#include <stdlib.h>
+/* Free motion: exact for any time that turns the body by no more than LARGEST_TURN. Rates and moments are scaled by
+   powers of two, the model gives the motion over a first angle, and doublings of that reach the rest.
+
+   Needs of the model: free_phase, free_start, free_double, free_finish; the free part of a. */
+#include "free_motion.h"
+
 #include <string.h>
 
-#include "instance.h"
+#include "composite.h"
 #include "model.h"
-
-#if FREE != FREE_NEVER
 
 /* A tumble from a spin about the middle axis grows by a factor e per radian of phase at most. A rate that is tiny beside
    the others is followed in pieces of LONGEST_TINY until it is not, or for so many pieces that it never will be. */
@@ -14,14 +15,7 @@ static const double TINY = 0x1p-400;
 static const double LONGEST_TINY = 16.0; /* rad */
 enum { MOST_PIECES = 48 };
 
-/* The state and the free part of a, scaled by powers of two so that rates and moments are about 1; the time then is
-   about the angle turned. */
-typedef struct {
-    double x[STATE_COUNT], a[AXES_COUNT], time;
-    int exponent; /* of the rates */
-} Scaled;
-
-static Scaled scale(const Instance *instance, const double x[], double time) {
+Scaled free_scaled(const Instance *instance, const double x[], double time) {
     Scaled scaled;
     memcpy(scaled.x, x, sizeof scaled.x);
     memcpy(scaled.a, instance->now.a, sizeof scaled.a);
@@ -69,26 +63,19 @@ static void follow(Instance *instance, const Scaled *scaled, int doublings, doub
     for (size_t i = 4; i < STATE_COUNT; i++) next[i] = ldexp(next[i], scaled->exponent);
 }
 
-/* Whether a rate is so small beside the others that the product of two such is no double. */
-static bool has_tiny_rate(const Scaled *scaled) {
+bool free_has_tiny_rate(const Scaled *scaled) {
     bool tiny = false;
     for (size_t i = 4; i < STATE_COUNT; i++) tiny = tiny || (scaled->x[i] != 0.0 && fabs(scaled->x[i]) < TINY);
     return tiny;
 }
 
-static bool all_finite(const double values[], size_t count) {
-    bool finite = true;
-    for (size_t i = 0; i < count; i++) finite = finite && isfinite(values[i]);
-    return finite;
-}
-
 /* One piece of free motion, *time [s] or less: what is left of it is *time. */
 static Status free_piece(Instance *instance, double x[], double *time, bool whole) {
-    Scaled scaled = scale(instance, x, *time);
+    Scaled scaled = free_scaled(instance, x, *time);
     double phase = phase_of(instance, &scaled), taken = *time, next[STATE_COUNT];
-    if (!whole && phase > LONGEST_TINY && has_tiny_rate(&scaled)) {
+    if (!whole && phase > LONGEST_TINY && free_has_tiny_rate(&scaled)) {
         taken = *time * (LONGEST_TINY / phase);
-        scaled = scale(instance, x, taken);
+        scaled = free_scaled(instance, x, taken);
         phase = phase_of(instance, &scaled);
     }
     bool finite = isfinite(phase);
@@ -106,10 +93,6 @@ static Status free_piece(Instance *instance, double x[], double *time, bool whol
     memcpy(x, next, sizeof next);
     *time -= taken;
     return STATUS_OK;
-}
-
-static bool is_at_rest(const double x[]) {
-    return x[4] == 0.0 && x[5] == 0.0 && x[6] == 0.0;
 }
 
 bool free_reaches(const double x[], double time) {
@@ -133,44 +116,3 @@ Status free_motion(Instance *instance, const double x[], double time, double nex
         status = free_piece(instance, next, &left, piece == MOST_PIECES);
     return status;
 }
-
-#if FREE == FREE_ALWAYS || FREE == FREE_WHILE_FREE
-
-/* By which rates may have to be divided for free_at: beyond, its constants would be no normal doubles. */
-enum { LARGEST_EXPONENT = 900 };
-
-/* Makes now.from_epoch. Returns whether it serves. */
-static bool find_constants(Instance *instance) {
-    Dynamics *now = &instance->now;
-    if (is_at_rest(now->epoch)) return false;
-    composite_refresh_axes(instance);
-    const Scaled scaled = scale(instance, now->epoch, 0.0);
-    if (has_tiny_rate(&scaled) || abs(scaled.exponent) > LARGEST_EXPONENT) return false;
-    const double unit = ldexp(1.0, scaled.exponent);
-    instance->arg[0] = scaled.x;
-    instance->arg[1] = scaled.a;
-    instance->arg[2] = &unit;
-    instance->res[0] = now->from_epoch;
-    free_constants(instance->arg, instance->res, instance->iw, instance->w, 0);
-    return all_finite(now->from_epoch, FREE_START);
-}
-
-Status free_motion_from_epoch(Instance *instance, double time, double next[]) {
-    Dynamics *now = &instance->now;
-    if (now->epoch_step == EPOCH_NEW) now->epoch_step = find_constants(instance) ? EPOCH_SERVED : EPOCH_DOUBLED;
-    if (now->epoch_step == EPOCH_DOUBLED) return free_motion(instance, now->epoch, time, next);
-    instance->arg[0] = now->from_epoch;
-    instance->arg[1] = &time;
-    instance->res[0] = next;
-    free_at(instance->arg, instance->res, instance->iw, instance->w, 0);
-    return STATUS_OK;
-}
-
-#endif
-
-#else
-
-/* C99 wants something to compile. */
-typedef int NothingFree;
-
-#endif

@@ -1,14 +1,17 @@
+/* The composite of a scene of many moving vessels, and its derivatives, by a loop over tables: in place of the model's
+   functions of these names, which straight code for so many vessels would make long and slow.
+
+   Keeps nothing: what a call needs lies in the work array that it is given. Needs the tables of vessel_loop.h and the
+   loop's steps, generated for one vessel (model.c) and for several at once (lane_kernels.h). */
+#include "vessel_loop.h"
+
 #include <stdbool.h>
 #include <string.h>
 
-#include "model.h"
-#include "loop.h"
-
-#if LOOP
-
 #include "lane_kernels.h"
+#include "model.h"
 
-enum { POSE = 12, PORT = 9, SEEN = 9, MOST_ARGUMENTS = 10, BLOCK = LOOP_BLOCK };
+enum { POSE = LOOP_POSE, PORT = LOOP_PORT, SEEN = LOOP_SEEN, BLOCK = LOOP_BLOCK };
 
 /* What follows from p. Of poses and of bodies seen from the root as many stand side by side as in the tables; the
    root's own pose is the last of the first ones. */
@@ -228,7 +231,7 @@ LANES_INLINE Lanes masses_of(const Sources sources, const LoopBody *const b[LANE
 /* Sums masses and first moments of a run of bodies of one kind. Returns where it ends.
    first : the first body's centre in every lane, which that body itself sets */
 LANES_INLINE size_t sum_run(const Sources sources, Chain *now, int kind, size_t j, Lanes first[3], double sum[4]) {
-    for (; j < LOOP_BODY_COUNT && LOOP_BODIES[j].kind == kind; j += LANES) {
+    for (; j < LOOP_BODY_COUNT && (int)LOOP_BODIES[j].kind == kind; j += LANES) {
         const LoopBody *b[LANES];
         take_bodies(b, j);
         const Lanes mass = masses_of(sources, b);
@@ -447,5 +450,3 @@ int composite_reverse(const double **arg, double **res, int *iw, double *w, int 
     frames_reverse(sources, now, v, wp, w);
     return 0;
 }
-
-#endif

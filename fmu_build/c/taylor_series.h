@@ -1,9 +1,9 @@
-/* Taylor series by loops: what supervessel/propagators/taylor.py unrolls for the twin, operation by operation. Loops,
-   because the unrolled code outgrows the instruction cache. */
-#ifndef TAYLOR_H
-#define TAYLOR_H
+/* Taylor series by loops: what supervessel/rotation/propagators/taylor.py unrolls for the twin, operation by operation.
+   Loops, because the unrolled code outgrows the instruction cache. */
+#ifndef TAYLOR_SERIES_H
+#define TAYLOR_SERIES_H
 
-enum { TAYLOR_LEAST_ORDER = 6, TAYLOR_MOST_ORDER = 20 };
+#include "scene.h"
 
 /* The coefficients of s^0, s^1, and so on, s being (time since x)/step, in the axes of the map.
    turn  : of the turn since x, a quaternion, without its 1

@@ -1,0 +1,46 @@
+/* The state of model exchange is the angular velocity: some changes of inputs do not keep the momentum. */
+#include <string.h>
+
+#include "exchange_state.h"
+#include "variables.h"
+
+void changes_mirror(Instance *instance) {
+    (void)instance;
+}
+
+/* In continuous time a change that keeps momentum beside others that keep the rate would need the inputs' rates. */
+Status exchange_check_continuous(Instance *instance, const double p[]) {
+    const unsigned keeping = (MASSES_KEEP_MOMENTUM ? KIND_MASS : 0) | (POSES_KEEP_MOMENTUM ? KIND_POSE : 0);
+    for (size_t i = 0; i < INPUT_P_COUNT; i++) {
+        if (!(INPUT_KINDS[i] & keeping) || p[i] == instance->now.stepped_p[i]) continue;
+        const Variable *variable = &VARIABLES[REFERENCE_P + i];
+        return instance_refuse(instance,
+                               "%s = %.10g%s%s: changed from %.10g in continuous-time mode, but %s keep the angular "
+                               "momentum and %s the angular velocity, so that its rate would have to be known; change "
+                               "it in event mode",
+                               variable->name, p[i], variable->unit[0] ? " " : "", variable->unit,
+                               instance->now.stepped_p[i], POSES_KEEP_MOMENTUM ? "poses" : "masses",
+                               POSES_KEEP_MOMENTUM ? "masses" : "poses");
+    }
+    return STATUS_OK;
+}
+
+void exchange_take_rate(Instance *instance, const double rate[3]) {
+    memcpy(instance_x(instance) + 4, rate, 3 * sizeof(double));
+}
+
+void exchange_commit(Instance *instance) {
+    (void)instance;
+}
+
+bool changes_moved(const Instance *instance) {
+    return memcmp(instance->now.kept_rate, &instance->now.values[REFERENCE_STATES + 4], 3 * sizeof(double)) != 0;
+}
+
+void changes_start_forward(Instance *instance, Variation *v) {
+    (void)instance, (void)v;
+}
+
+void changes_start_reverse(Instance *instance, Variation *v) {
+    (void)instance, (void)v;
+}

@@ -1,0 +1,145 @@
+/* The arithmetic of taylor_series.h, and nothing of the FMU: it needs no instance and keeps nothing. */
+#include "taylor_series.h"
+
+#include <math.h>
+
+/* Whether the law has products of rates, and whether their map has axes of its own. */
+enum { GYROSCOPIC = PRODUCT_COUNT > 0, TURNED = PRODUCT_COUNT > 3 };
+
+enum { WIDTH = GYROSCOPIC ? 10 : 7 };
+
+/* What the products take of a coefficient: seven of the turn or the rates, see _turn in
+   supervessel/rotation/propagators/taylor.py, then the rates, in an order that lets compilers take all by twos. */
+typedef struct {
+    double of[WIDTH];
+} Row;
+
+static double remainder_of(double before, double after) {
+    return after / sqrt(before > 0.0 ? before : 1.0);
+}
+
+/* sums: of products, element by element, of rows from `one` on and rows from `other` back. */
+static void add_products(const Row *one, const Row *other, int count, double sums[WIDTH]) {
+    double s[WIDTH] = {0.0};
+    for (int j = 0; j < count; j++)
+        for (int i = 0; i < WIDTH; i++) s[i] += one[j].of[i] * other[-j].of[i];
+    for (int i = 0; i < WIDTH; i++) sums[i] = s[i];
+}
+
+/* Between body axes and those of the map, whose own stand behind its first three numbers, column by column. */
+static void from_body(const double map[], const double v[3], double out[3]) {
+    for (int i = 0; i < 3; i++)
+        out[i] = TURNED ? map[3 + 3 * i] * v[0] + map[4 + 3 * i] * v[1] + map[5 + 3 * i] * v[2] : v[i];
+}
+
+static void to_body(const double map[], const double v[3], double out[3]) {
+    for (int i = 0; i < 3; i++)
+        out[i] = TURNED ? map[3 + i] * v[0] + map[6 + i] * v[1] + map[9 + i] * v[2] : v[i];
+}
+
+/* Fills the rows of one coefficient. */
+static void spread(const double turn[4], const double rate[3], double step, double one[WIDTH], double other[WIDTH]) {
+    const double even = turn[0] + turn[2], odd = turn[1] + turn[3], p = turn[0] - turn[2], q = turn[1] - turn[3];
+    one[0] = even + odd;
+    one[1] = even - odd;
+    one[2] = p + q;
+    one[3] = p - q;
+    one[4] = turn[3];
+    one[5] = turn[1];
+    one[6] = turn[2];
+    const double eighth = 0.125 * step, y = eighth * rate[1];
+    const double plus = eighth * rate[0] + eighth * rate[2], minus = eighth * rate[0] - eighth * rate[2];
+    other[0] = plus + y;
+    other[1] = y - plus;
+    other[2] = minus - y;
+    other[3] = -y - minus;
+    other[4] = -step * rate[1];
+    other[5] = -step * rate[2];
+    other[6] = -step * rate[0];
+    if (!GYROSCOPIC) return;
+    one[8] = other[7] = rate[1];
+    one[9] = other[8] = rate[2];
+    one[7] = other[9] = rate[0];
+}
+
+static void estimate(Series *series) {
+    double before[2] = {0.0, 0.0}, after[2] = {0.0, 0.0};
+    for (int k = series->order - 3; k <= series->order; k++) {
+        double *squares = k < series->order - 1 ? before : after;
+        for (int i = 0; i < 4; i++) squares[0] += series->turn[k][i] * series->turn[k][i];
+        for (int i = 0; i < 3; i++) squares[1] += series->rates[k][i] * series->rates[k][i];
+    }
+    series->error[0] = 2.0 * remainder_of(before[0], after[0]);
+    series->error[1] = remainder_of(before[1], after[1]);
+}
+
+void taylor_series(const double x[7], const double acceleration[3], const double map[], double step, Series *series) {
+    Row ones[TAYLOR_MOST_ORDER], others[TAYLOR_MOST_ORDER];
+    double w[3], push[3];
+    from_body(map, x + 4, w);
+    from_body(map, acceleration, push);
+    const double half = 0.5 * step, X = half * w[0], Y = half * w[1], Z = half * w[2];
+    const int order = series->order;
+    double(*turn)[4] = series->turn, (*rates)[3] = series->rates;
+    for (int i = 0; i < 3; i++) rates[0][i] = w[i];
+    turn[0][0] = turn[0][1] = turn[0][2] = turn[0][3] = 0.0;
+    turn[1][0] = 0.0;
+    turn[1][1] = X;
+    turn[1][2] = Y;
+    turn[1][3] = Z;
+    for (int i = 0; i < 3; i++) rates[1][i] = step * push[i];
+    double pull[3] = {0.0, 0.0, 0.0};
+    for (int i = 0; i < 3 && GYROSCOPIC; i++) {
+        pull[i] = step * map[i];
+        rates[1][i] = pull[i] * (w[(i + 1) % 3] * w[(i + 2) % 3]) + rates[1][i];
+    }
+    for (int k = 1; k < order; k++) {
+        const double *p = turn[k], *v = rates[k], scale = 1.0 / (k + 1);
+        double s[WIDTH];
+        add_products(ones + 1, others + (k - 1), k - 1, s);
+        const double even = s[0] + s[2], odd = s[1] + s[3], f = s[0] - s[2], g = s[1] - s[3];
+        double *next = turn[k + 1], *rate = rates[k + 1];
+        next[0] = scale * (-(even + odd) - ((p[1] * X + p[2] * Y) + p[3] * Z));
+        next[1] = scale * ((((even - odd) + s[4]) + half * v[0]) + ((p[0] * X + p[2] * Z) - p[3] * Y));
+        next[2] = scale * ((((f + g) + s[5]) + half * v[1]) + ((p[0] * Y + p[3] * X) - p[1] * Z));
+        next[3] = scale * ((((f - g) + s[6]) + half * v[2]) + ((p[0] * Z + p[1] * Y) - p[2] * X));
+        rate[0] = rate[1] = rate[2] = 0.0;
+        if (GYROSCOPIC) {
+            rate[0] = (scale * pull[0]) * (s[8] + (w[1] * v[2] + v[1] * w[2]));
+            rate[1] = (scale * pull[1]) * (s[9] + (w[2] * v[0] + v[2] * w[0]));
+            rate[2] = (scale * pull[2]) * (s[7] + (w[0] * v[1] + v[0] * w[1]));
+        }
+        if (k + 1 < order) spread(p, v, step, ones[k].of, others[k].of);
+    }
+    estimate(series);
+}
+
+void taylor_sum(const Series *series, const double x[7], const double map[], double share, double next[7],
+                double rest[3]) {
+    double turned[2][4] = {{0.0}}, gained[2][3] = {{0.0}}, axis[3], gain[3];
+    const double square = share * share;
+    for (int k = series->order; k > 0; k -= 2) { /* the smallest first */
+        for (int i = 0; i < 4; i++) turned[0][i] = turned[0][i] * square + series->turn[k][i];
+        for (int i = 0; i < 4; i++) turned[1][i] = turned[1][i] * square + series->turn[k - 1][i];
+        for (int i = 0; i < 3; i++) gained[0][i] = gained[0][i] * square + series->rates[k][i];
+        for (int i = 0; i < 3; i++) gained[1][i] = gained[1][i] * square + series->rates[k - 1][i];
+    }
+    for (int i = 0; i < 4; i++) turned[0][i] = turned[0][i] * square + turned[1][i] * share;
+    for (int i = 0; i < 3; i++) gained[0][i] = gained[0][i] * square + gained[1][i] * share;
+    to_body(map, turned[0] + 1, axis);
+    to_body(map, gained[0], gain);
+    const double a = turned[0][0], b = axis[0], c = axis[1], d = axis[2];
+    const double q[4] = {
+        x[0] + (x[0] * a - (x[1] * b + x[2] * c + x[3] * d)),
+        x[1] + (x[0] * b + x[1] * a + (x[2] * d - x[3] * c)),
+        x[2] + (x[0] * c + x[2] * a + (x[3] * b - x[1] * d)),
+        x[3] + (x[0] * d + x[3] * a + (x[1] * c - x[2] * b)),
+    };
+    const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    for (int i = 0; i < 4; i++) next[i] = q[i] / length;
+    for (int i = 0; i < 3; i++) { /* Knuth's sum: next and rest together are exact */
+        const double added = gain[i] + rest[i], sum = x[4 + i] + added, back = sum - x[4 + i];
+        rest[i] = (x[4 + i] - (sum - back)) + (added - back);
+        next[4 + i] = sum;
+    }
+}
