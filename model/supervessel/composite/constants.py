@@ -121,7 +121,13 @@ def _mated() -> ca.Function:
 @cache
 def _placed_bodies() -> ca.Function:
     """Returns the function from `placed_body`'s arguments to centre and inertia."""
-    sizes = {"mass": (1,), "specific_inertia": (3, 3), "centre": (3,), "rotation": (3, 3), "origin": (3,)}
+    sizes = {
+        "mass": (1,),
+        "specific_inertia": (3, 3),
+        "centre": (3,),
+        "R_outer_vessel": (3, 3),
+        "origin": (3,),
+    }
     arguments = {name: ca.SX.sym(name, *size) for name, size in sizes.items()}
     body = placed_body(**arguments)
     return ca.Function("placed", list(arguments.values()), [body.centre, body.inertia])

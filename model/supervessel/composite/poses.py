@@ -13,10 +13,13 @@ from supervessel.scene.numbers import Vector
 
 @dataclass(frozen=True)
 class Pose:
-    """Where a frame stands: rotation (3, 3) out of it and its origin (3,) [m], both in outer axes.
+    """Where a frame, the inner axes, stands in outer axes, and how it moves there.
 
-    velocity, rate : (3,) [m/s] of the origin and (3,) [rad/s], relative to the outer axes, in them; both None
-                     where the frame is at rest there
+    rotation : R_outer_inner, (3, 3)
+    origin   : (3,) [m], of the inner axes, outer axes
+    velocity : (3,) [m/s], of that origin relative to the outer axes, outer axes
+    rate     : (3,) [rad/s], of the inner axes relative to the outer axes, outer axes
+    velocity and rate are both None where the inner axes are at rest in the outer ones.
     """
 
     rotation: ca.SX
@@ -25,7 +28,12 @@ class Pose:
     rate: ca.SX | None = None
 
     def then(self, inner: "Pose") -> "Pose":
-        """Returns the pose, in these outer axes, of a frame whose pose is known in this one."""
+        """Returns the pose in this pose's outer axes of a frame that is known in this pose's inner axes.
+
+        inner : pose of the frame in the inner axes
+        With R, o, v, w of this pose and R_i, o_i, v_i, w_i of `inner`: rotation R R_i, origin o + R o_i,
+        velocity v + w x R o_i + R v_i, rate w + R w_i.
+        """
         arm = self.rotation @ inner.origin
         rotation, origin = self.rotation @ inner.rotation, self.origin + arm
         velocity, rate = self.velocity, self.rate
@@ -38,18 +46,19 @@ class Pose:
         return Pose(rotation, origin, velocity, rate)
 
     def inverse(self) -> "Pose":
-        """Returns the pose of the outer axes in this frame, which is at rest."""
+        """Returns the pose of the outer axes in the inner ones: R^T, -R^T o. Takes a pose at rest only."""
         return Pose(self.rotation.T, -(self.rotation.T @ self.origin))
 
 
 @inlined((3,), (3,))
 def port_axes(direction: ca.SX, alignment: ca.SX) -> ca.SX:
-    """Returns the orthonormal columns (d, a, d x a), (3, 3), of a port, vessel axes.
+    """Returns R_vessel_port, (3, 3): the orthonormal columns d, a, d x a of a port.
 
-    direction : (3,), kept but for its length
-    alignment : (3,), projected onto the plane across direction
-    Both of any length > 0 whose square neither under- nor overflows, not parallel. The projection is
-    (d x alignment) x d, which is perpendicular to d to rounding even where the two are nearly parallel.
+    direction : (3,), vessel axes; d is its direction
+    alignment : (3,), vessel axes; a is the direction of its projection onto the plane across d
+    Both may have any length > 0 whose square neither under- nor overflows. They must not be parallel, which
+    is not checked. The projection is (d x alignment) x d, perpendicular to d to rounding even where the two
+    are nearly parallel.
     """
     d = direction / ca.sqrt(ca.sumsqr(direction))
     across = ca.cross(ca.cross(d, alignment), d)
@@ -60,8 +69,9 @@ def port_axes(direction: ca.SX, alignment: ca.SX) -> ca.SX:
 def mated_pose(parent: tuple[ca.SX, ca.SX], child: tuple[ca.SX, ca.SX]) -> Pose:
     """Returns the pose of the child vessel in the parent's axes.
 
-    parent, child : position (3,) [m] and axes (3, 3) of the mated ports, each in its own vessel's axes
-    Source: [CV] eqs. (8), (9): R d_child = -d_parent, R a_child = a_parent, ports at one point.
+    parent, child : position (3,) [m] and R_vessel_port, (3, 3), of each mated port, its own vessel's axes
+    R is R_parent_child: R d_child = -d_parent, R a_child = a_parent; both ports are at one point.
+    Source: [CV] eqs. (8), (9); [EQ] The assembly.
     """
     (position_parent, axes_parent), (position_child, axes_child) = parent, child
     facing = ca.horzcat(-axes_parent[:, 0], axes_parent[:, 1], -axes_parent[:, 2])
@@ -76,5 +86,5 @@ def scaled(vector: Vector) -> ArrayLike:
 
 
 def constant(value: ArrayLike) -> ca.SX:
-    """Returns numbers as symbols."""
+    """Returns an array of numbers as a dense CasADi expression of the same shape."""
     return ca.densify(ca.SX(ca.DM(np.asarray(value, dtype=float))))
