@@ -1,13 +1,18 @@
-"""Attitude quaternions in CasADi symbols: unit, scalar first, Hamilton product, body to inertial axes."""
+"""Attitude quaternions in CasADi symbols: unit, scalar first, Hamilton product, body to inertial axes.
+
+q = (w, v) = (w, x, y, z) takes body components of a vector to inertial ones: (0, v_inertial) =
+q (0, v_body) q*, with q* = (w, -v). Source of all that follows from this: [EQ] Conventions.
+"""
 
 import casadi as ca
 
 
 def attitude_dot(attitude: ca.SX, angular_velocity: ca.SX) -> ca.SX:
-    """Returns the rate of the attitude, (4,) [1/s]: half the product q * (0, omega).
+    """Returns the rate of the attitude, q' = q (0, omega)/2, (4,) [1/s].
 
-    attitude         : (4,), q_inertial_body
-    angular_velocity : (3,) [rad/s], body axes
+    attitude         : q_inertial_body, (4,), of any length
+    angular_velocity : omega, of the body relative to inertial axes, (3,) [rad/s], body axes
+    Source: [EQ] Conventions.
     """
     w, x, y, z = ca.vertsplit(attitude)
     p, q, r = ca.vertsplit(0.5 * angular_velocity)
@@ -20,15 +25,16 @@ def attitude_dot(attitude: ca.SX, angular_velocity: ca.SX) -> ca.SX:
 
 
 def unit(quaternion: ca.SX) -> ca.SX:
-    """Returns the quaternion, (4,), at length 1; its length must be far from under- and overflow."""
+    """Returns the quaternion, (4,), at length 1. The square of its length must be an ordinary double."""
     return quaternion / ca.sqrt(ca.sumsqr(quaternion))
 
 
 def to_inertial(attitude: ca.SX, vector_body: ca.SX) -> ca.SX:
-    """Returns a vector's components, (3,), in inertial axes.
+    """Returns a vector, (3,), in inertial axes, in its own unit.
 
-    attitude    : (4,), unit, q_inertial_body
-    vector_body : (3,), body axes
+    attitude    : q_inertial_body, (4,), of unit length
+    vector_body : u, (3,), body axes
+    u + 2 w v x u + 2 v x (v x u) is the vector part of q (0, u) q*.
     """
     w, axis = attitude[0], attitude[1:]
     twice = 2.0 * ca.cross(axis, vector_body)
@@ -36,14 +42,21 @@ def to_inertial(attitude: ca.SX, vector_body: ca.SX) -> ca.SX:
 
 
 def product(first: ca.SX, second: ca.SX) -> ca.SX:
-    """Returns the Hamilton product of two quaternions, (4,)."""
+    """Returns the Hamilton product of two quaternions, (4,): q_A_C of q_A_B and q_B_C.
+
+    (w1, v1)(w2, v2) = (w1 w2 - v1 . v2, w1 v2 + w2 v1 + v1 x v2).
+    """
     p, q = first[1:], second[1:]
     w = first[0] * second[0] - ca.dot(p, q)
     return ca.vertcat(w, first[0] * q + second[0] * p + ca.cross(p, q))
 
 
 def rotation_matrix(attitude: ca.SX) -> ca.SX:
-    """Returns R_inertial_body, (3, 3), of a unit quaternion, (4,)."""
+    """Returns R_inertial_body, (3, 3), the matrix of `to_inertial`.
+
+    attitude : q_inertial_body, (4,), of any length whose square is an ordinary double
+    (w^2 - |v|^2) E + 2 v v^T + 2 w [v x], over w^2 + |v|^2.
+    """
     w, x, y, z = ca.vertsplit(attitude)
     X, Y, Z = 2.0 * x, 2.0 * y, 2.0 * z
     ww, xx, yy, zz = w * w, x * x, y * y, z * z
@@ -55,13 +68,14 @@ def rotation_matrix(attitude: ca.SX) -> ca.SX:
     )
 
 
-def quaternion(rotation: ca.SX) -> ca.SX:
-    """Returns the unit quaternion, (4,), scalar part >= 0, of a rotation matrix, (3, 3).
+def quaternion(R_outer_inner: ca.SX) -> ca.SX:
+    """Returns q_outer_inner, (4,), of unit length and scalar part >= 0: the inverse of `rotation_matrix`.
 
-    Of the four multiples of the quaternion that the matrix gives the longest is brought to unit length; it
-    jumps to its negative where the body has turned by 180 degrees.
+    R_outer_inner : (3, 3), a rotation
+    The elements of R give 4 w q, 4 x q, 4 y q and 4 z q. The one with the largest factor is brought to unit
+    length, so nothing small divides. The result jumps to its negative where R turns by 180 degrees.
     """
-    R = rotation
+    R = R_outer_inner
     x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
     xy, zx, yz = R[1, 0] + R[0, 1], R[0, 2] + R[2, 0], R[2, 1] + R[1, 2]
     best = ca.vertcat(1.0 + R[0, 0] + R[1, 1] + R[2, 2], x, y, z)

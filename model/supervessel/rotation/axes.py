@@ -1,4 +1,4 @@
-"""The vector a of principal moments and axes that a scene needs: its parts, and how it changes with c."""
+"""The vector a of principal moments and axes that a scene needs: its parts, and its derivative by c."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,8 +18,8 @@ from supervessel.rotation.propagators import Plan
 class AxesGraph:
     """Principal moments and axes in CasADi symbols.
 
-    a      : all parts as an expression of c, (n,); empty where the scene needs none
-    slices : where each part stands in a
+    a      : all parts, one after the other, as an expression of c, (n,); empty where the scene needs none
+    slices : by the name of a part, its place in a
     """
 
     a: ca.SX
@@ -33,10 +33,10 @@ def axes_graph(resolved: ResolvedScene, plan: Plan, inertia: ca.SX, products: ca
     products : the law's map of products of rates, see `rotation.steps.map_of_products`
 
     principal : (7,), where outputs show it: moments [kg m2], ascending, and q_body_principal
-    free      : (12,), where free motion is exact: moments of the tensor that the law turns freely, and
+    free      : (12,), where free motion is exact: principal moments [kg m2] of `RotationLaw.turning`, and
                 R_body_principal, column by column
-    series    : for Taylor steps: the factors, (3,), that take products of two rates to the acceleration in
-                principal axes; then, unless these axes are the body's, R_body_principal, (9,)
+    series    : for Taylor steps: the factors (J_j - J_k)/J_i of products of two rates, (3,), principal axes;
+                then, unless body axes are principal axes, R_body_principal, (9,), column by column
     """
     rotation = resolved.scene.rotation
     shown = any(kind.axes for kind, _ in resolved.output_kinds)
@@ -59,13 +59,13 @@ def axes_graph(resolved: ResolvedScene, plan: Plan, inertia: ca.SX, products: ca
 
 
 def axes_derivative(inertia: ca.SX, c: ca.SX, a: ca.SX, slices: Mapping[str, slice]) -> GivenDerivative:
-    """Returns how the moments and axes that outputs show change with the composite.
+    """Returns the derivative by c of the principal moments and axes that outputs show.
 
-    inertia : (3, 3) [kg m2], an expression of c
-    c, a    : symbols of the composite, of its moments and axes
-    slices  : where the parts of a stand
-    The change is formed at the moments and axes in a: CasADi never differentiates how they were found. The
-    parts of a that outputs do not show are given no change.
+    inertia : (3, 3) [kg m2], body axes, an expression of c
+    c, a    : symbols of the composite, (n,), and of its moments and axes, (m,)
+    slices  : by the name of a part, its place in a
+    The derivative is `principal_forward` at the moments and axes in a, so CasADi never differentiates the
+    iteration that found them. The parts of a that outputs do not show get the derivative zero.
     """
     dc = ca.SX.sym("dc", c.numel())
     da = ca.SX.zeros(a.numel())

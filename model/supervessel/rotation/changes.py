@@ -1,8 +1,15 @@
 """What happens to the angular velocity when masses, poses and docks change, in CasADi symbols.
 
-A change goes from the inputs as they were to those as they are, at one instant, in this order: what undocks
-leaves with its share, so that the rest keeps its rate; masses and moments change, then poses and the motion
-of ports, each keeping rate or momentum as the scene says; what docks brings its momentum along.
+A change happens at one instant and takes the inputs p from their values before to those after, in stages:
+
+1. docks open: what undocks takes its share of the momentum along, and the root's part keeps its rate omega;
+2. masses and moments change, keeping omega or the momentum H = J omega + h, as the scene says;
+3. poses and the motion of ports change, likewise;
+4. docks close: what docks brings along its angular momentum about the common barycentre.
+
+All vectors and tensors are about the barycentre in body axes: J [kg m2] and h [N m s] as in [EQ] When masses
+or poses change, which is the source of the equations here. In stages 2 and 3 J is the tensor of the law,
+`RotationLaw.keeping`; in stage 4 it is the full tensor under every law.
 """
 
 from collections.abc import Callable, Mapping
@@ -25,13 +32,16 @@ Parts = Mapping[str, ca.SX]
 
 @dataclass(frozen=True)
 class Change:
-    """Functions of what changes, in CasADi symbols; c and d are composites.
+    """The functions that a change of inputs is made of; omega is (3,) [rad/s], c and d are composites, (n,).
 
-    momentum_of      : omega, c -> angular momentum J omega + h, (3,) [N m s], body axes, J the law's tensor
-    rate_of_momentum : momentum, c -> omega
-    keep_momentum    : omega, c, d -> omega after a change from c to d that keeps the momentum
-    contact_momentum : p, k -> momentum, (3,) [N m s], that docks which close bring with motion k at contact
-    docked_rate      : omega, momentum, d -> omega when that momentum has been added, by the full tensor
+    momentum_of      : omega, c -> H = J omega + h, (3,) [N m s]
+    rate_of_momentum : H, c -> omega = J^-1 (H - h)
+    keep_momentum    : omega, c, d -> omega - J_d^-1 ((J_d - J_c) omega + h_d - h_c), after a change from c to
+                       d that keeps H; to the last bit omega where c and d are the same
+    contact_momentum : p, k -> dH, (3,) [N m s], that closing docks bring, whose parts move by k at contact
+    docked_rate      : omega, dH, d -> omega + J_d^-1 dH, J_d the full tensor
+
+    The tensors that are inverted must be positive definite; it is not checked here.
     """
 
     momentum_of: ca.Function
@@ -44,11 +54,13 @@ class Change:
 def change_functions(
     resolved: ResolvedScene, c: ca.SX, parts_of: Callable[[ca.SX], Parts], p: ca.SX, k: ca.SX
 ) -> Change:
-    """Returns the functions of what changes.
+    """Returns the functions that a change of inputs is made of.
 
-    c        : symbols of a composite
-    parts_of : composite -> its parts
-    p, k     : symbols of the inputs that shape the composite, of the motion at contact
+    c        : symbols of a composite, (n,)
+    parts_of : composite, (n,) -> its parts by name, see `composite.parts`
+    p        : symbols of the inputs that shape the composite, (m,)
+    k        : symbols of the motion at contact, (6 d,): of each of d docks velocity [m/s] and rate [rad/s] of
+               its second port relative to the first, in the axes of the first one's vessel
     """
     law = LAWS[resolved.scene.rotation.law]
     omega, added, d = ca.SX.sym("omega", 3), ca.SX.sym("added", 3), ca.SX.sym("d", c.numel())
@@ -77,13 +89,13 @@ def change_functions(
 def followed(
     resolved: ResolvedScene, change: Change, composite: ca.Function, margins: slice, inputs: tuple[ca.SX, ...]
 ) -> ca.SX:
-    """Returns the angular velocity, (3,) [rad/s], after a change of inputs, in the order of this module.
+    """Returns the angular velocity, (3,) [rad/s], body axes, after the stages of a change.
 
     composite : p -> c
-    margins   : part of c, positive where its tensor is positive definite
-    inputs    : angular velocity before, p before, p after, motions at contact k
-    On the way a stage may have no mass or no moment of inertia, but then nothing may change from or to it
-    that keeps the momentum, else NaN (the FMU refuses it).
+    margins   : place in c of the three numbers that are positive where the tensor is positive definite
+    inputs    : omega before, (3,) [rad/s], body axes; p before and p after, (m,); k, (6 d,)
+    Between two stages the composite may have no mass or a singular tensor. NaN is returned where a stage that
+    keeps the momentum changes an input from or to such a composite; the FMU refuses that change.
     """
     omega, before, after, k = inputs
     kinds = [variable.kind.change for variable in resolved.shaping]
@@ -117,6 +129,7 @@ def followed(
 
 
 def _spin(parts: Parts) -> ca.SX:
+    """Returns h, (3,) [N m s]: zero where no port moves."""
     return parts["momentum"][:3] if "momentum" in parts else ca.SX.zeros(3)
 
 

@@ -14,15 +14,15 @@ from supervessel.rotation.laws import LAWS, RotationLaw
 
 @dataclass(frozen=True)
 class Dynamics:
-    """What turns a body.
+    """The quantities in the equation of rotation, all about the barycentre in body axes.
 
     law         : the rotation law
     numbers     : the law's own numbers, from `RotationLaw.prepare`
-    inertia     : tensor about the barycentre, (3, 3) [kg m2], body axes
-    torque      : about the barycentre, (3,) [N m], body axes
-    spin        : angular momentum, (3,) [N m s], body axes, of the parts that move relative to the body; None
-                  where no port moves or the law has no gyroscopic term
-    spin_square : square of a bound of the acceleration by that spin over |omega|, [rad2/s2]; None with `spin`
+    inertia     : J, (3, 3) [kg m2]
+    torque      : M, sum of all torques, (3,) [N m]
+    spin        : h, angular momentum of the parts that move relative to body axes, (3,) [N m s]; None where
+                  no port moves or the law has no gyroscopic term
+    spin_square : [rad2/s2], square of a bound of |J^-1 (omega x h)|/|omega|; None where spin is None
     """
 
     law: RotationLaw
@@ -33,27 +33,33 @@ class Dynamics:
     spin_square: ca.SX | None
 
     def state_rate(self, state: ca.SX) -> ca.SX:
-        """Returns the rate, (7,), of the state (attitude, angular velocity), (7,)."""
+        """Returns the rate of the state, (7,) [1/s, rad/s2]: q' = q (0, omega)/2, and omega' by the law.
+
+        state : q_inertial_body, (4,), and omega, (3,) [rad/s], body axes
+        The law is given the torque M - omega x h.
+        Source: [EQ] Conventions; Rotation: the four laws; When masses or poses change.
+        """
         attitude, omega = state[:4], state[4:]
         torque = self.torque if self.spin is None else self.torque - ca.cross(omega, self.spin)
         acceleration = self.law.acceleration(self.numbers, omega, torque)
         return ca.vertcat(attitude_dot(attitude, omega), acceleration)
 
     def momentum_rate(self, omega: ca.SX, momentum: ca.SX) -> ca.SX:
-        """Returns the rate, (3,) [N m], of the angular momentum's components in body axes.
+        """Returns H' = M - omega x H, (3,) [N m], of the components of the angular momentum in body axes.
 
         omega    : angular velocity, (3,) [rad/s], body axes
-        momentum : (3,) [N m s], body axes, with the spin
+        momentum : H = J omega + h, (3,) [N m s], body axes
+        A law without gyroscopic term leaves omega x H out.
         """
         turning = ca.cross(omega, momentum) if self.law.gyroscopic_term else ca.SX.zeros(3)
         return self.torque - turning
 
 
 def dynamics_of(resolved: ResolvedScene, parts: Mapping[str, ca.SX], u: ca.SX) -> Dynamics:
-    """Returns what turns the composite of a scene.
+    """Returns the quantities in the equation of rotation of a scene's composite.
 
-    parts : of the composite by name, see `composite.parts`
-    u     : the inputs that act
+    parts : the parts of c by name, see `composite.parts`
+    u     : the inputs that act, (m,) [N m, N], in the order of `ResolvedScene.acting`
     """
     law = LAWS[resolved.scene.rotation.law]
     spins = "momentum" in parts and law.gyroscopic_term

@@ -1,4 +1,7 @@
-"""The states of model exchange: the angular momentum in place of the rate where every change keeps it."""
+"""The states of model exchange: attitude and angular velocity, or attitude and angular momentum.
+
+The momentum is the state where every change of inputs keeps it: the states then do not jump with the inputs.
+"""
 
 from dataclasses import dataclass
 
@@ -13,10 +16,10 @@ from supervessel.rotation.dynamics import Dynamics
 class ExchangeStates:
     """The states z that an importer's solver integrates.
 
-    symbols : z, (7,)
-    name    : of z as an argument of functions
-    rate    : z_dot, (7,)
-    x       : (attitude, angular velocity), (7,), as an expression of z
+    symbols : z, (7,): q_inertial_body, then omega [rad/s] or the momentum H = J omega + h [N m s], body axes
+    name    : name of z as an argument of functions, "x" or "z"
+    rate    : z_dot, (7,), an expression of z
+    x       : q_inertial_body and omega [rad/s], body axes, (7,), an expression of z
     """
 
     symbols: ca.SX
@@ -26,14 +29,15 @@ class ExchangeStates:
 
 
 def states_by_rate(x: ca.SX, dynamics: Dynamics) -> ExchangeStates:
-    """Returns attitude and angular velocity as the states."""
+    """Returns attitude and angular velocity, x, (7,), as the states."""
     return ExchangeStates(x, "x", dynamics.state_rate(x), x)
 
 
 def states_by_momentum(change: Change, c: ca.SX, dynamics: Dynamics) -> ExchangeStates:
     """Returns attitude and angular momentum as the states.
 
-    c : symbols of the composite
+    change : gives omega = J^-1 (H - h), see `changes.Change`
+    c      : symbols of the composite, (n,)
     A change of inputs that keeps the angular momentum then leaves the states as they are.
     """
     z = ca.SX.sym("z", 7)

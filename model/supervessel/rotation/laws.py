@@ -1,9 +1,10 @@
 """Rotation laws in CasADi symbols: angular acceleration from rates and torque, cheapest law first.
 
-A law is two functions. `prepare` turns an inertia tensor into the numbers that the law needs, once for
-each change of inertia; `acceleration` uses them at every stage of a step. A new law is one entry in LAWS.
-For series the same acceleration is also written as what the torque gives plus a linear map of products
-of two rates: `products` and `gyroscopic`.
+A law is one entry in LAWS. Its `prepare` turns an inertia tensor into the numbers that the law needs, once
+for each change of inertia; its `acceleration` uses them at every stage of a step. Power series need the same
+acceleration as a sum: that by the torque, plus a linear map of products of two rates, which `products` and
+`gyroscopic` give.
+All vectors and tensors are in body axes. Source: [EQ] Rotation: the four laws.
 """
 
 from collections.abc import Callable
@@ -31,12 +32,15 @@ class RotationLaw:
     """How the angular velocity changes.
 
     prepare      : inertia (3, 3) [kg m2] -> the law's own numbers, (n,)
-    acceleration : those, angular velocity (3,) [rad/s], torque (3,) [N m] -> (3,) [rad/s2]; body axes
+    acceleration : the law's numbers, angular velocity (3,) [rad/s], torque about the barycentre (3,) [N m]
+                   -> angular acceleration (3,) [rad/s2]
     growth       : bound of d|omega|/dt over |omega|^2 without torque
-    products     : pairs (i, j), n of them: without torque the acceleration is linear in omega_i omega_j
-    gyroscopic   : the law's numbers -> that linear map, (3, n)
-    turning      : inertia (3, 3) -> the tensor, (3, 3), whose free motion the law describes
-    keeping      : inertia (3, 3) -> the tensor, (3, 3), by which a change keeps the angular momentum
+    products     : n pairs (i, j): without torque the acceleration is linear in the products omega_i omega_j
+    gyroscopic   : the law's numbers -> the linear map of these products to the acceleration, (3, n)
+    turning      : inertia (3, 3) [kg m2] -> the tensor whose free motion is the law's motion without torque,
+                   (3, 3) [kg m2]; the unit tensor where that is a steady rate
+    keeping      : inertia (3, 3) [kg m2] -> J in the momentum J omega + h that a change of masses or poses
+                   keeps, (3, 3) [kg m2]
     """
 
     prepare: Callable[[ca.SX], ca.SX]
@@ -49,7 +53,7 @@ class RotationLaw:
 
     @property
     def gyroscopic_term(self) -> bool:
-        """Whether angular momentum turns the angular velocity."""
+        """Whether the law has the torque -omega x J omega."""
         return bool(self.products)
 
 
@@ -58,15 +62,17 @@ SQUARES = ((0, 0), (1, 1), (2, 2))
 
 
 def _nothing(inertia: ca.SX) -> ca.SX:
+    """Returns no numbers, (0,)."""
     return ca.SX(0, 1)
 
 
 def _keep(numbers: ca.SX, omega: ca.SX, torque: ca.SX) -> ca.SX:
+    """omega' = 0."""
     return ca.SX.zeros(3)
 
 
 def _spherical(inertia: ca.SX) -> ca.SX:
-    """Returns a tensor whose free motion is a steady rate."""
+    """Returns the unit tensor: its free motion is a steady rate."""
     return ca.SX.eye(3)
 
 
@@ -87,16 +93,17 @@ def _reciprocal_moments(inertia: ca.SX) -> ca.SX:
 
 
 def _decoupled(numbers: ca.SX, omega: ca.SX, torque: ca.SX) -> ca.SX:
+    """J_ii omega_i' = M_i."""
     return torque * numbers
 
 
 def _scale(inertia: ca.SX) -> ca.SX:
-    """Returns a power of two that brings the largest moment to between 3/4 and 3.
+    """Returns a power of two whose product with the largest moment is between 3/4 and 3.
 
-    So scaled, moments times rates neither over- nor underflow before the rates do, and no other bit changes.
-    Two moments' mean is at least half of the third, and no larger than a double. Less 2^-52 of itself it is
-    one or two units in its last place smaller. Rounding powers of two from 1 on down, which changes nothing,
-    makes it a constant in derivatives.
+    With moments scaled by it, moments times rates neither over- nor underflow before the rates do, and no
+    other bit changes. The mean of two moments is at least half of the third, and always a double. Less 2^-52
+    of itself it is one or two units in its last place smaller: by `unit`, a power of two. Rounding down by
+    `floor` changes no power of two from 1 on; it makes the scale a constant in derivatives.
     """
     mean = 0.5 * inertia[0, 0] + 0.5 * inertia[1, 1]
     unit = mean - (1.0 - 2.0**-52) * mean
@@ -111,7 +118,7 @@ def _moments(inertia: ca.SX) -> ca.SX:
 
 
 def _principal(numbers: ca.SX, omega: ca.SX, torque: ca.SX) -> ca.SX:
-    """[CV] eq. (2): Euler's equations with the diagonal of the tensor only."""
+    """J_11 omega_1' = M_1 - (J_33 - J_22) omega_2 omega_3 and cyclically: [CV] eq. (2)."""
     J, reciprocal, torque = numbers[:3], numbers[3:6], numbers[6] * torque
     return ca.vertcat(
         (torque[0] - (J[2] - J[1]) * omega[1] * omega[2]) * reciprocal[0],
@@ -133,10 +140,10 @@ def _tensor_and_inverse(inertia: ca.SX) -> ca.SX:
 
 
 def _tensor(numbers: ca.SX, omega: ca.SX, torque: ca.SX) -> ca.SX:
-    """[CV] eq. (1): J omega' = M - omega x J omega with the full tensor.
+    """J omega' = M - omega x J omega: [CV] eq. (1).
 
-    Multiplying by the inverse takes as many operations as solving with the factors, but none of them
-    waits for another: half the time of a step.
+    Multiplying by the inverse takes as many operations as solving with the factors, but they do not wait for
+    each other: half the time of a step.
     """
     J, inverse = from_upper_triangle(numbers[:6]), from_upper_triangle(numbers[6:12])
     return inverse @ (numbers[12] * torque - ca.cross(omega, J @ omega))
@@ -158,12 +165,12 @@ def _tensor_products(numbers: ca.SX) -> ca.SX:
 
 
 def principal_products(moments: ca.SX) -> ca.SX:
-    """Returns (J_j - J_k)/J_i, (3,), which take MIXED_PRODUCTS to the acceleration without torque.
+    """Returns (J_j - J_k)/J_i, (3,), (i, j, k) cyclic: without torque omega_i' is this times omega_j omega_k.
 
-    moments : principal, (3,) [kg m2]; rates and acceleration in their axes
-    The same as the map of the law "tensor" in body axes. There the inverse of the tensor enlarges rounding by
-    its condition number, with moments 1e12 apart to a steady spin about the lightest axis; here nothing is
-    inverted.
+    moments : principal moments J_i, (3,) [kg m2]; omega and omega' are in principal axes
+    This is the map of the law "tensor" in principal axes. In body axes the inverse of the tensor enlarges
+    rounding by its condition number, where moments are 1e12 apart even that of a steady spin about the
+    lightest axis. Here nothing is inverted.
     """
     return ca.vertcat(*((moments[i - 2] - moments[i - 1]) / moments[i] for i in range(3)))
 

@@ -1,7 +1,7 @@
 """Principal moments and axes of an inertia tensor in CasADi symbols, without branches.
 
-CasADi may differentiate `principal` where the moments are distinct; `principal_forward` is the same, shorter,
-and gives the moments' changes where they are not.
+CasADi may differentiate `principal` where the moments are distinct. `principal_forward` gives the same
+derivative with fewer operations, and also the changes of moments that are equal.
 """
 
 import casadi as ca
@@ -22,9 +22,10 @@ TIE = 2.0**-40
 """Weight of the rule that decides between frames of equal scalar part: see `principal`."""
 
 LEAST_SHARE, LEAST = 2.0**-900, 2.0**-1022
-"""Of the largest moment, and at least: what stands for the difference of two equal moments where it divides.
+"""LEAST_SHARE times the largest moment, but at least LEAST, stands for the difference of two equal moments
+where a difference divides.
 
-Quotients by it pass for infinity and are doubles still.
+Quotients by it are so large that they pass for infinity, and are still doubles.
 """
 
 _Rows = list[list[ca.SX]]
@@ -63,47 +64,49 @@ def principal(inertia: ca.SX) -> tuple[ca.SX, ca.SX]:
     return ca.vertcat(*moments), _least_turned(_orthonormal(_matrix(V)))
 
 
-def quaternion(rotation: ca.SX) -> ca.SX:
-    """Returns the unit quaternion, (4,), scalar part > 0, of a rotation matrix.
+def quaternion(R_body_principal: ca.SX) -> ca.SX:
+    """Returns q_body_principal, (4,), of unit length and scalar part > 0.
 
-    rotation : (3, 3), trace at least 0, as `principal` returns
+    R_body_principal : (3, 3), trace at least 0, from `principal`
+    4 w q at unit length, as in `attitude.quaternion`: with such a trace w is at least 1/2.
     """
-    axis = ca.vertcat(
-        rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]
-    )
-    return unit(ca.vertcat(1.0 + ca.trace(rotation), axis))
+    R = R_body_principal
+    axis = ca.vertcat(R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1])
+    return unit(ca.vertcat(1.0 + ca.trace(R), axis))
 
 
-def principal_forward(moments: ca.SX, rotation: ca.SX, d_inertia: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Returns the changes of the principal moments, (3,) [kg m2], and of the axes' quaternion, (4,).
+def principal_forward(moments: ca.SX, R_body_principal: ca.SX, d_inertia: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Returns the changes of the principal moments, (3,) [kg m2], and of q_body_principal, (4,).
 
-    moments, rotation : from `principal`
-    d_inertia         : (3, 3) [kg m2], symmetric, a small change of the tensor
+    moments, R_body_principal : from `principal`, (3,) [kg m2] and (3, 3)
+    d_inertia                 : dJ, (3, 3) [kg m2], symmetric, a small change of the tensor, body axes
 
-    With v_i the axes, moment i changes by v_i . dJ v_i and the frame turns about v_k by
-    v_i . dJ v_j / (lambda_i - lambda_j), (i, j, k) cyclic: J R = R diag(lambda) differentiated. Linear in
-    d_inertia, so that transposing gives its weights. Equal moments are not differentiable: what is returned
-    are their changes along the axes that `principal` happened to choose. The axes are not even continuous
-    there: where dJ tilts them, the change of the quaternion is about 1e271 times that over the largest
-    moment, for infinity. Jumps from one proper frame to another are left out.
+    With v_i the axes and lambda_i the moments, moment i changes by v_i . dJ v_i and the frame turns about v_k
+    by v_i . dJ v_j / (lambda_i - lambda_j), (i, j, k) cyclic: J R = R diag(lambda) differentiated. Both are
+    linear in dJ, so the reverse derivative is the transpose. Equal moments are not differentiable: their
+    changes are returned along the axes that `principal` happened to choose. The axes are not even continuous
+    there: where dJ tilts them, the change of the quaternion is about 1e271 times dJ over the largest moment
+    and stands for infinity. Jumps from one proper frame to another are left out.
     """
-    change = rotation.T @ d_inertia @ rotation
+    change = R_body_principal.T @ d_inertia @ R_body_principal
     turn = ca.vertcat(
         *(change[i, j] / _gap(moments[i] - moments[j], moments[2]) for i, j in ((1, 2), (2, 0), (0, 1)))
     )
-    return ca.diag(change), attitude_dot(quaternion(rotation), turn)
+    return ca.diag(change), attitude_dot(quaternion(R_body_principal), turn)
 
 
 def _gap(difference: ca.SX, largest: ca.SX) -> ca.SX:
-    """Returns the difference of two moments, or, where there is none, a small number to divide by."""
+    """Returns the difference of two moments [kg m2], or where it is zero a small number to divide by."""
     return ca.if_else(difference == 0.0, ca.fmax(LEAST_SHARE * largest, LEAST), difference)
 
 
 def _rotate(A: _Rows, V: _Rows, p: int, q: int) -> None:
     """Makes A[p][q] zero by a rotation in the plane p, q, by 45 degrees at most, added to V.
 
-    The tangent comes from the quotient that is at most 1/2: smooth wherever the element or the gap is not
-    zero. Where the element is zero, so is the tangent, and nothing changes, to the last bit.
+    With gap = A_qq - A_pp and off = A_pq the angle a of the rotation has tan 2a = 2 off/gap. tan a comes from
+    off/gap where that is at most 1 in size, else from gap/(2 off): smooth wherever off or gap is not zero.
+    Where off is zero, so is tan a, and nothing changes, to the last bit.
+    Source: [GVL] section 8.5.
     """
     r = 3 - p - q
     off = A[p][q]

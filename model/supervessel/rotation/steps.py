@@ -15,7 +15,7 @@ from supervessel.scene.schema import Scene
 
 @dataclass(frozen=True)
 class StepFunctions:
-    """How a scene goes on in time; x is (attitude, angular velocity), u the inputs that act.
+    """Steps of a scene in time: x is (attitude, angular velocity), u the inputs that act, c the composite.
 
     fastest_square : x, u, c -> square [rad2/s2] of a rate that the body does not exceed while it turns by the
                      scene's largest angle of a sub-step
@@ -95,10 +95,10 @@ def _free_motion(plan: Plan, axes: AxesGraph) -> list[ca.Function]:
 
 
 def map_of_products(dynamics: Dynamics) -> ca.SX:
-    """Returns the linear map, (3, n), of products of two rates to the acceleration without torque.
+    """Returns the linear map, (3, n), of products of two rates to the acceleration without torque, body axes.
 
-    n is the number of the law's products. Where the axes are principal, so that the squares of rates have no
-    effect, n is 3: the columns of squares are left out.
+    n is the number of the law's `products`. Where body axes are principal axes the squares of rates have no
+    effect: their columns are left out, and n is 3.
     """
     products = dynamics.law.gyroscopic(dynamics.numbers)
     count = products.size2()
