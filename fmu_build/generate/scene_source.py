@@ -60,7 +60,7 @@ def _row(entry: TableEntry, needs: Mapping[int, frozenset[str]]) -> str:
         f'"{variable.name}"',
         f'"{variable.unit}"',
         repr(variable.start or 0.0),
-        repr(variable.nominal),
+        repr(entry.nominal),
         f"ROLE_{entry.role.upper()}",
         " | ".join(f"FOLLOWS_{flag}" for flag in flags) or "0",
         "TYPE_BOOLEAN" if variable.boolean else "TYPE_NUMBER",

@@ -258,8 +258,8 @@ def _type_attributes(entry: TableEntry) -> dict[str, str]:
     if unit.display:
         attributes["displayUnit"] = unit.display[0]
     numbers = {"min": variable.low, "max": variable.high, "start": variable.start}
-    if variable.nominal != 1.0:
-        numbers["nominal"] = variable.nominal
+    if entry.nominal != 1.0:
+        numbers["nominal"] = entry.nominal
     return attributes | {name: repr(number) for name, number in numbers.items() if number is not None}
 
 

@@ -11,6 +11,7 @@ from typing import Literal
 import casadi as ca
 
 from fmu_build.generate.vessel_loop import LONGEST_CODE
+from fmu_build.interface.nominals import magnitudes_at_start, nominal_of
 from supervessel.equations import Equations
 from supervessel.scene.schema import keeps_momentum
 from supervessel.scene.variables import Variable
@@ -32,6 +33,7 @@ class TableEntry:
     """A variable of the FMU.
 
     reference    : value reference, the variable's place in the table
+    nominal      : its magnitude, for an importer's solver
     dependencies : inputs and states that an output or a derivative depends on
     initial      : inputs and start parameters that an output, a state or a derivative depends on at the start
     """
@@ -39,6 +41,7 @@ class TableEntry:
     variable: Variable
     reference: int
     role: Role
+    nominal: float = 1.0
     dependencies: tuple[Dependency, ...] = ()
     initial: tuple[Dependency, ...] = ()
 
@@ -66,13 +69,15 @@ def variable_table(model: Equations) -> tuple[TableEntry, ...]:
     knowns += [reference for reference, variable in inputs if variable.part != "contact"]
     booleans = frozenset(reference for reference, variable in inputs if variable.boolean)
     by_role, at_start = _dependencies(model, knowns, booleans)
+    whole = magnitudes_at_start(resolved.scene)
     entries = []
     for role, variables in groups.items():
         for i, variable in enumerate(variables):
             now = by_role[role][i] if role in by_role else ()
             start = at_start[role][i] if role in at_start else ()
             initial = _at_start(start, first["state"], first["parameter"])
-            entries.append(TableEntry(variable, first[role] + i, role, now, initial))
+            nominal = nominal_of(variable, whole)
+            entries.append(TableEntry(variable, first[role] + i, role, nominal, now, initial))
     return tuple(entries)
 
 

@@ -21,6 +21,7 @@ from supervessel.scene.variables import (
     InputVariable,
     OutputVariable,
     Parameter,
+    StateVariable,
     Variable,
     derivative_variables,
     input_variables,
@@ -92,7 +93,7 @@ class ResolvedScene:
 
     @cached_property
     def outputs(self) -> tuple[OutputVariable, ...]:
-        """The outputs in the scene's order, element by element, with their magnitudes."""
+        """The outputs in the scene's order, element by element."""
         return output_variables(self.scene)
 
     @cached_property
@@ -107,7 +108,7 @@ class ResolvedScene:
         return tuple(name for group, (kind, _) in groups_of for name, _ in kind.elements(group))
 
     @cached_property
-    def states(self) -> tuple[Variable, ...]:
+    def states(self) -> tuple[StateVariable, ...]:
         """The seven states of model exchange."""
         return state_variables(self.scene)
 

@@ -2,17 +2,12 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import hypot, isfinite
 
-import numpy as np
-
-from supervessel import reference
 from supervessel.scene.inputs import InputKind, Part, listed
 from supervessel.scene.outputs import (
     AXES,
     OUTPUTS,
     QUATERNION,
-    Magnitudes,
     OutputKind,
     output_kind,
 )
@@ -27,7 +22,6 @@ class Variable:
     unit      : as FMI writes it, "" for a pure number
     start     : value at the start, None for what is calculated
     low, high : the range that the scene gives, else what is possible at all, None where all is
-    nominal   : its magnitude, for an importer's solver
     group     : the name without its index
     element   : place in its group, from 0
     boolean   : whether it is true or false; its numbers are then 1 and 0
@@ -39,7 +33,6 @@ class Variable:
     start: float | None = None
     low: float | None = None
     high: float | None = None
-    nominal: float = 1.0
     group: str = ""
     element: int = 0
     boolean: bool = False
@@ -80,6 +73,16 @@ class OutputVariable(Variable):
 
     kind: OutputKind
     owner: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StateVariable(Variable):
+    """A state of model exchange.
+
+    kind : the row, in the table of outputs, of the quantity whose element it is
+    """
+
+    kind: OutputKind
 
 
 RATE_UNITS = {"": "1/s", "rad/s": "rad/s2", "N.m.s": "N.m"}
@@ -144,13 +147,11 @@ def parameter_variables(scene: Scene) -> tuple[Parameter, ...]:
 
 def output_variables(scene: Scene) -> tuple[OutputVariable, ...]:
     """Returns the outputs that the scene lists, in its order, vectors and tensors element by element."""
-    magnitudes = _magnitudes(scene)
     return tuple(
         OutputVariable(
             name,
             kind.unit,
             kind.description.format(vessel=vessel) + (f", {label}" if label else ""),
-            nominal=_usable(kind.nominal(magnitudes)),
             group=group,
             element=i,
             kind=kind,
@@ -162,36 +163,25 @@ def output_variables(scene: Scene) -> tuple[OutputVariable, ...]:
     )
 
 
-def _magnitudes(scene: Scene) -> Magnitudes:
-    """Returns the magnitudes at the start that outputs have theirs by."""
-    whole = reference.composite(scene)
-    return Magnitudes(whole.mass, float(np.trace(whole.inertia)) / 3.0, _rate(scene))
-
-
-def state_variables(scene: Scene) -> tuple[Variable, ...]:
+def state_variables(scene: Scene) -> tuple[StateVariable, ...]:
     """Returns the seven states of model exchange: attitude (w, x, y, z), then what changes keep.
 
     That is the angular velocity, or the angular momentum where every change keeps it; (x, y, z) in body axes.
     """
-    kept, words = "angular_velocity", OUTPUTS["angular_velocity"].description
-    nominal = _usable(_rate(scene))
+    attitude, kept = OUTPUTS["attitude"], OUTPUTS["angular_velocity"]
+    words = kept.description
     if keeps_momentum(scene):
-        kept, words = "angular_momentum", "angular momentum about the barycentre, body axes"
-        nominal = _usable(OUTPUTS[kept].nominal(_magnitudes(scene)))
-    attitude = OUTPUTS["attitude"].description
+        kept, words = OUTPUTS["angular_momentum"], "angular momentum about the barycentre, body axes"
     return tuple(
-        Variable(
-            f"state.{group}[{i + 1}]",
-            OUTPUTS[group].unit,
+        StateVariable(
+            f"state.{kind.name}[{i + 1}]",
+            kind.unit,
             f"state: {description}, {label}",
-            nominal=magnitude,
-            group=f"state.{group}",
+            group=f"state.{kind.name}",
             element=i,
+            kind=kind,
         )
-        for group, description, labels, magnitude in (
-            ("attitude", attitude, QUATERNION, 1.0),
-            (kept, words, AXES, nominal),
-        )
+        for kind, description, labels in ((attitude, attitude.description, QUATERNION), (kept, words, AXES))
         for i, label in enumerate(labels)
     )
 
@@ -208,16 +198,3 @@ def derivative_variables(states: Iterable[Variable]) -> tuple[Variable, ...]:
         )
         for state in states
     )
-
-
-def _usable(nominal: float) -> float:
-    """Returns a magnitude in three digits, 1 where it would be none: zero or beyond all doubles.
-
-    More digits differ between processors: numpy's library of linear algebra adds up in different orders.
-    """
-    return float(f"{nominal:.3g}") if isfinite(nominal) and nominal > 0.0 else 1.0
-
-
-def _rate(scene: Scene) -> float:
-    """Returns the magnitude of the angular velocity [rad/s]: the scene's at the start, or 1 from rest."""
-    return hypot(*scene.rotation.angular_velocity) or 1.0
