@@ -12,7 +12,7 @@ from hypothesis import Phase, assume, given, settings
 from supervessel import reference
 from supervessel.composite.inertia import from_upper_triangle, upper_triangle
 from supervessel.rotation import principal as module
-from supervessel.rotation.principal import TIE, principal, principal_forward, quaternion
+from supervessel.rotation.principal import TIE, principal, principal_forward, quaternion_of_axes
 from support import EPS, Array, U, random_rotation
 
 DENORMAL = 2.0**-1074
@@ -37,7 +37,7 @@ def function(sweeps: int | None = None) -> ca.Function:
         moments, rotation = principal(from_upper_triangle(x))
     finally:
         module.SWEEPS = before
-    return ca.Function("principal", [x], [moments, rotation, quaternion(rotation)])
+    return ca.Function("principal", [x], [moments, rotation, quaternion_of_axes(rotation)])
 
 
 PRINCIPAL = function()

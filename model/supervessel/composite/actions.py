@@ -1,4 +1,7 @@
-"""What single vessels do in the whole, in CasADi symbols: where forces act, and outputs of a vessel."""
+"""Single vessels of the composite in CasADi symbols: forces and torques that act on them, and their outputs.
+
+Root axes are the root vessel's; body axes have the same directions, with the origin at the barycentre.
+"""
 
 from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass
@@ -21,10 +24,12 @@ Placed = Mapping[str, tuple[Pose, ca.SX | None]]
 
 @dataclass(frozen=True)
 class Acting:
-    """What an input that acts on a vessel makes of its three components, body axes.
+    """Matrices that take the three components of a force or torque on a vessel, in its axes, to body axes.
 
-    moment : (3, 3), torque about the barycentre
-    force  : (3, 3), force; None: none
+    moment : (3, 3), to the torque about the barycentre: [rho x] R_body_vessel of a force at rho from the
+             barycentre, R_body_vessel of a torque
+    force  : (3, 3), to the force: R_body_vessel; None of a torque
+    Both are zero while the vessel is not docked.
     """
 
     moment: ca.SX
@@ -32,7 +37,7 @@ class Acting:
 
 
 def _at_point(scene: Scene, name: str, where: Placed, centre: ca.SX) -> Acting:
-    """Returns what a force at a point, "vessel.point", does."""
+    """Returns the matrices of a force at the point called "vessel.point"."""
     pose, attached = where[vessel_of(name)]
     arm = pose.origin + pose.rotation @ constant(scene.point(name).position) - centre
     turned = pose.rotation if attached is None else attached * pose.rotation
@@ -40,7 +45,7 @@ def _at_point(scene: Scene, name: str, where: Placed, centre: ca.SX) -> Acting:
 
 
 def _on_vessel(scene: Scene, name: str, where: Placed, centre: ca.SX) -> Acting:
-    """Returns what a torque on a vessel, in its axes, does."""
+    """Returns the matrices of a torque on the vessel called `name`."""
     pose, attached = where[name]
     return Acting(pose.rotation if attached is None else attached * pose.rotation)
 
@@ -49,9 +54,9 @@ ACTIONS: dict[str, Callable[[Scene, str, Placed, ca.SX], Acting]] = {
     "force": _at_point,
     "vessel_torque": _on_vessel,
 }
-"""Torque and force of an input that acts, by the input's key, from scene, owner, poses and barycentre.
+"""By the key of `[inputs]`: scene, owner, poses of vessels, barycentre -> the matrices of an input that acts.
 
-An input of any other kind is a torque about the barycentre in body axes.
+An input of another key is itself a torque about the barycentre in body axes.
 """
 
 
@@ -60,9 +65,9 @@ def action_parts(resolved: ResolvedScene, lookup: Lookup, centre: ca.SX) -> dict
 
     centre : barycentre, (3,) [m], root axes
 
-    "moment" : (9 n,), n matrices (3, 3) column by column, one for each force, then for each torque on a
-               vessel: what each makes of its three components as torque about the barycentre, body axes
-    "force"  : (9 m,), likewise for each force its components in body axes
+    "moment" : (9 n,), the matrices `Acting.moment`, column by column, of each force, then of each torque on a
+               vessel
+    "force"  : (9 m,), the matrices `Acting.force`, column by column, of each force
     """
     acting = [variable for _, variable in _acting(resolved) if variable.kind.key in ACTIONS]
     if not acting:
@@ -77,12 +82,16 @@ def action_parts(resolved: ResolvedScene, lookup: Lookup, centre: ca.SX) -> dict
 
 
 def _acting(resolved: ResolvedScene) -> list[tuple[int, InputVariable]]:
-    """Returns place in u and first variable of each input that acts."""
+    """Returns of each input that acts its place in u and the variable of its first element."""
     return [(place, variable) for place, variable in enumerate(resolved.acting) if variable.element == 0]
 
 
 def torque_about_barycentre(resolved: ResolvedScene, parts: Mapping[str, ca.SX], u: ca.SX) -> ca.SX:
-    """Returns the torque of everything that acts, (3,) [N m], body axes; u : the inputs that act."""
+    """Returns the sum M of all torques about the barycentre, those of forces included, (3,) [N m], body axes.
+
+    parts : the parts of c by name, see `action_parts`
+    u     : the inputs that act, (m,) [N m, N]
+    """
     total, taken = ca.SX.zeros(3), 0
     for place, variable in _acting(resolved):
         own = u[place : place + 3]
@@ -94,7 +103,7 @@ def torque_about_barycentre(resolved: ResolvedScene, parts: Mapping[str, ca.SX],
 
 
 def net_force(resolved: ResolvedScene, parts: Mapping[str, ca.SX], u: ca.SX) -> ca.SX:
-    """Returns the sum of the forces, (3,) [N], body axes."""
+    """Returns the sum of all forces, (3,) [N], body axes; parts, u : as in `torque_about_barycentre`."""
     total = ca.SX.zeros(3)
     places = [place for place, variable in _acting(resolved) if variable.kind is FORCE]
     for number, place in enumerate(places):
@@ -103,6 +112,7 @@ def net_force(resolved: ResolvedScene, parts: Mapping[str, ca.SX], u: ca.SX) -> 
 
 
 def _matrix(numbers: ca.SX, number: int) -> ca.SX:
+    """Returns one of the matrices, (3, 3), that `numbers` holds column by column, counted from 0."""
     return ca.reshape(numbers[9 * number : 9 * number + 9], 3, 3)
 
 
@@ -110,12 +120,13 @@ SIZES = {"docked": 1, "origin": 3, "centre": 3, "rotation": 9, "rate": 3, "inert
 """Sizes of the elements of a vessel's part of c; all are zero while the vessel is not docked.
 
 docked   : 1 or 0
-origin   : of the vessel's axes, from the barycentre [m], body axes
-centre   : the vessel's centre of mass, from the barycentre [m], body axes
+origin   : origin of the vessel axes [m], body axes
+centre   : the vessel's centre of mass [m], body axes
 rotation : R_body_vessel, column by column
-rate     : of the vessel relative to the body axes [rad/s], body axes
-inertia  : of the vessel about the composite's barycentre [kg m2], body axes, upper triangle
-spin     : angular momentum about the barycentre of the vessel's motion relative to the body axes [N m s]
+rate     : angular velocity of the vessel relative to body axes [rad/s], body axes
+inertia  : of the vessel about the barycentre of the composite [kg m2], body axes, xx, yy, zz, xy, xz, yz
+spin     : angular momentum of the vessel's motion relative to body axes, about the barycentre [N m s], body
+           axes
 """
 
 
@@ -157,10 +168,10 @@ def _vessel_part(body: Body, pose: Pose, whole: Body) -> ca.SX:
 
 
 def vessel_outputs(name: str, part: ca.SX, attitude: ca.SX, omega: ca.SX) -> dict[str, ca.SX]:
-    """Returns the outputs of a vessel by name.
+    """Returns the outputs of a vessel by name; `scene.outputs` says what they are, with units and axes.
 
-    part     : the vessel's part of c, in the layout of SIZES
-    attitude : q_inertial_body, (4,)
+    part     : the vessel's part of c, (28,), in the layout of SIZES
+    attitude : q_inertial_body, (4,), of unit length
     omega    : angular velocity of the body, (3,) [rad/s], body axes
     """
     pieces = {key: part[place] for key, place in slices_of(SIZES).items()}
@@ -182,7 +193,7 @@ def vessel_outputs(name: str, part: ca.SX, attitude: ca.SX, omega: ca.SX) -> dic
 
 
 def _placed(resolved: ResolvedScene, lookup: Lookup, names: Set[str]) -> dict[str, tuple[Pose, ca.SX | None]]:
-    """Returns some vessels' poses in the root's axes, and whether they hang on the root (None: always)."""
+    """Returns by name the poses of some vessels, root axes, and 1 while docked, else 0 (None: always)."""
     return {
         name: (group.pose_of(name), group.attached)
         for group in placed_groups(resolved, lookup)

@@ -1,4 +1,9 @@
-"""Docking in CasADi symbols: the vessels of a scene, placed in the root's axes and put together."""
+"""Docking in CasADi symbols: the vessels of a scene, placed in root axes and put together.
+
+Root axes are the axes of the root vessel. A rigid group is a set of vessels that never move relative to each
+other; its axes are those of one of its vessels, see `resolved.RigidGroup`.
+Source of poses and sums: [EQ] The assembly; of motions: [EQ] When masses or poses change.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,13 +22,13 @@ from supervessel.scene.schema import Scene
 from supervessel.scene.variables import InputVariable
 
 Lookup = Callable[[str, ArrayLike], ca.SX]
-"""Takes an input's name without index and the scene's value; returns its symbols, or the constant."""
+"""Name of an input without index, the scene's value -> its symbols, or that value where it is no input."""
 
 
 def lookup_in(inputs: Sequence[InputVariable], values: ca.SX) -> Lookup:
-    """Returns the function that takes the name of an input without index to its symbols.
+    """Returns the function that gives an input's symbols by its name without index.
 
-    inputs : the inputs that have symbols; any other name is a constant, the scene's value
+    inputs : the inputs that have symbols; for any other name the function returns the scene's value
     values : symbols of the inputs, in their order, (n,)
     """
     first: dict[str, int] = {}
@@ -41,11 +46,11 @@ def lookup_in(inputs: Sequence[InputVariable], values: ca.SX) -> Lookup:
 
 @dataclass(frozen=True)
 class PlacedGroup:
-    """A rigid group of vessels and how it hangs on the root.
+    """A rigid group of vessels, placed in root axes.
 
-    pose     : of the group's axes in the root vessel's
-    attached : 1 while docks hold it to the root, else 0; None: always
-    inside   : poses of its vessels in the group's axes, constants
+    pose     : of the group's axes in root axes
+    attached : 1 while docks hold the group to the root, else 0; None where they always do
+    inside   : by vessel, its pose in the group's axes, a constant
     """
 
     pose: Pose
@@ -79,7 +84,7 @@ def composite_body(resolved: ResolvedScene, lookup: Lookup) -> Body:
 
 
 def by_convention(scene: Scene, whole: Body) -> Body:
-    """Returns the whole as the scene's convention has it: Orbiter's is without products of inertia."""
+    """Returns the composite under the scene's convention: Orbiter's leaves the products of inertia out."""
     if scene.convention == "orbiter":
         diagonal = symmetric(lambda i, j: whole.inertia[i, i] if i == j else ca.SX(0.0))
         return Body(whole.mass, whole.centre, diagonal, whole.velocity, whole.spin)
@@ -105,7 +110,11 @@ def placed_groups(resolved: ResolvedScene, lookup: Lookup) -> list[PlacedGroup]:
 
 
 def _placing(resolved: ResolvedScene, lookup: Lookup) -> Callable[[Way], Pose]:
-    """Returns the function that gives a group's pose by one way."""
+    """Returns the function from a way to the pose, in root axes, of the group at its end.
+
+    A pose is the product of the poses along the way: of the parent's group, of the parent vessel in it, of
+    the child vessel in the parent's axes, and of the child's group in the child's axes.
+    """
     scene, home = resolved.scene, resolved.home
 
     @cache
@@ -122,7 +131,7 @@ def _placing(resolved: ResolvedScene, lookup: Lookup) -> Callable[[Way], Pose]:
 
 
 def _all_true(way: Way, lookup: Lookup) -> ca.SX | None:
-    """Returns the product of the flags on a way; None if there is none on it."""
+    """Returns 1 where every dock on a way is closed, else 0; None if no input opens a dock on it."""
     product = None
     for dock in way.docks:
         flag = lookup(f"{dock}.docked", 1.0)
@@ -131,9 +140,10 @@ def _all_true(way: Way, lookup: Lookup) -> ca.SX | None:
 
 
 def _chosen(flags: Sequence[ca.SX], poses: Sequence[Pose]) -> tuple[ca.SX, Pose]:
-    """Returns whether one of the ways holds, and the pose by it: all zero where none does.
+    """Returns 1 and the pose by the way that holds; 0 and a pose of zeros where none holds.
 
-    flags : 1 for the way that holds, 0 for the others
+    flags : of each way, 1 if it holds, else 0; at most one holds, as docks make no loop
+    poses : of the group by each way, root axes
     """
 
     def pick(values: Sequence[ca.SX]) -> ca.SX:
@@ -152,7 +162,7 @@ def _chosen(flags: Sequence[ca.SX], poses: Sequence[Pose]) -> tuple[ca.SX, Pose]
 
 
 def _lumped(scene: Scene, group: RigidGroup, lookup: Lookup) -> list[Body]:
-    """Returns a group in its axes: its constant vessels as one body, then each vessel that varies."""
+    """Returns a group's bodies in its axes: the constant vessels as one, then each vessel that varies."""
     bodies = [vessel_body(scene, name, lookup, group.inside[name]) for name in group.varying]
     if group.fixed is None:
         return bodies
@@ -161,10 +171,12 @@ def _lumped(scene: Scene, group: RigidGroup, lookup: Lookup) -> list[Body]:
 
 
 def _joint_pose(scene: Scene, joint: Joint, lookup: Lookup) -> Pose:
-    """Returns the child's pose in the parent's axes, with its motion where a port moves.
+    """Returns the pose of the child vessel in the parent's axes, with its motion where a port moves.
 
-    Of ports at p_P, p_C that move with v, w each: the child's rate is w_P - R w_C, and with
-    o = p_P - R p_C its origin moves with v_P - rate x (R p_C) - R v_C.
+    With R = R_parent_child, p_P, v_P, w_P position, velocity and rate of the parent's port in the parent's
+    axes, and p_C, v_C, w_C of the child's port in the child's axes, o = p_P - R p_C differentiated gives the
+    child's rate w = w_P - R w_C and the velocity v_P - R v_C - w x R p_C of its origin. The motion at contact
+    of a dock is added to that of the parent's port.
     """
     parent, child = (_port(scene, name, lookup) for name in joint.ports)
     pose = mated_pose(parent, child)
@@ -187,7 +199,7 @@ def _joint_pose(scene: Scene, joint: Joint, lookup: Lookup) -> Pose:
 
 
 def _port_motion(scene: Scene, name: str, lookup: Lookup) -> tuple[ca.SX, ca.SX] | None:
-    """Returns velocity and rate of a port in its vessel's axes; None where it is at rest."""
+    """Returns velocity, (3,) [m/s], and rate, (3,) [rad/s], of a port, its vessel's axes; None: at rest."""
     if name not in scene.inputs.motion:
         return None
     velocity, rate = (lookup(f"{name}.{key}", np.zeros(3)) for key in ("velocity", "rate"))
@@ -197,10 +209,12 @@ def _port_motion(scene: Scene, name: str, lookup: Lookup) -> tuple[ca.SX, ca.SX]
 
 
 def _contact_motion(scene: Scene, joint: Joint, lookup: Lookup, pose: Pose) -> tuple[ca.SX, ca.SX] | None:
-    """Returns velocity and rate, (3,) each, parent's axes, of the child at the port as it touches.
+    """Returns the motion of the child's port at contact, (3,) [m/s] and (3,) [rad/s], parent's axes; or None.
 
-    The inputs give those of the dock's second port relative to the first, in the axes of the first one's
-    vessel. Seen from a parent on the second port, the first one moves the other way.
+    joint : a dock that an input closes, its `dock`
+    pose  : of the child in the parent's axes
+    The inputs are velocity and rate of the dock's second port relative to the first, in the axes of the first
+    port's vessel. Where the parent has the second port, both are reversed and turned into its axes.
     """
     velocity, rate = (lookup(f"{joint.dock}.{key}", np.zeros(3)) for key in ("velocity", "rate"))
     if velocity.is_zero() and rate.is_zero():

@@ -1,8 +1,8 @@
-"""What never changes in a scene, as numbers: where the vessels of rigid groups stand, and what they weigh.
+"""Constants of a scene as numbers: poses of vessels in their rigid groups, their masses, centres and tensors.
 
-The equations are those of the other modules, each made a function once and evaluated for all vessels
-together: the same operations in the same order as on symbols that hold constants, so the same bits, in a
-small part of the time.
+The equations are those of `poses` and `inertia`, each made a CasADi function once and evaluated for all
+vessels together. The operations and their order are the same as on symbols that hold constants, and so are
+all bits; it takes a small part of the time.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ Places = Mapping[str, Pose]
 
 
 def places(scene: Scene, parts: Sequence[VesselGroup]) -> list[Places]:
-    """Returns where the vessels of each rigid group stand."""
+    """Returns of each rigid group the poses of its vessels in its axes, by name."""
     steps = iter(_mated_poses(scene, [joint for part in parts for joint in part.joints]))
     found: list[Places] = []
     for part in parts:
@@ -34,9 +34,10 @@ def places(scene: Scene, parts: Sequence[VesselGroup]) -> list[Places]:
 
 
 def constant_and_varying(scene: Scene, inside: Places) -> tuple[list[str], list[str]]:
-    """Returns the vessels of a group that are constant, and the others, in the order of adding them up.
+    """Returns the names of a group's constant vessels, and of its varying ones, in the order of summation.
 
-    The heaviest stand first, those whose mass is an input last; those without mass are left out.
+    A vessel varies if its mass or its moments are inputs. The heaviest stand first; vessels whose mass is an
+    input stand last; vessels whose mass is constant and zero are left out.
     """
     of_mass, of_moments = set(scene.inputs.mass), set(scene.inputs.pmi)
     known = [name for name in inside if name not in of_mass and scene.vessels[name].mass > 0.0]
@@ -48,7 +49,9 @@ def constant_and_varying(scene: Scene, inside: Places) -> tuple[list[str], list[
 def lump(scene: Scene, placed: Places) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
     """Returns vessels of constant mass as one body: mass [kg], centre (3,) [m], inertia (3, 3) [kg m2].
 
-    placed : the vessels, in the order in which they are added up; at least one
+    placed : by name, their poses in the group's axes, in the order of summation; at least one
+    The centre is from the origin of the group's axes, the inertia about the centre in these axes, see
+    `inertia.combine`.
     """
     masses = np.array([scene.vessels[name].mass for name in placed])
     centres, tensors = _seen(scene, placed, masses)
@@ -56,7 +59,7 @@ def lump(scene: Scene, placed: Places) -> tuple[float, NDArray[np.float64], NDAr
 
 
 def seen_in_group(scene: Scene, placed: Places) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Returns centres, (n, 3) [m], and tensors over mass, (n, 3, 3) [m2], of vessels in the group's axes."""
+    """Returns centres of mass, (n, 3) [m], and tensors over mass, (n, 3, 3) [m2], in the group's axes."""
     centres, tensors = _seen(scene, placed, np.ones(len(placed)))
     return centres.T, tensors.transpose(2, 0, 1)
 

@@ -8,12 +8,13 @@ from supervessel.scene.inputs import part_of
 from supervessel.scene.schema import Dock, Scene
 
 MOST_WAYS = 64
-"""Ways of docking by which a vessel may hang on the root: each has a pose of its own in the equations."""
+"""Most ways by which a vessel may hang on the root. Each way has a pose of its own in the equations."""
 
 
 MOST_WAYS_IN_ALL = 2000
 MOST_PASSED = 50_000
-"""Ways of all vessels together, and docks with an input on them: a pose each, a factor each."""
+"""Most ways of all vessels together, each a pose in the equations; most docks with an input on all these ways
+together, each a factor in the equations."""
 
 
 class TooManyWaysError(ValueError):
@@ -41,10 +42,10 @@ class Joint:
 
 @dataclass(frozen=True)
 class VesselGroup:
-    """Vessels that are held together by docks always closed, none of whose ports has a pose input.
+    """Vessels held together by docks that are always closed and whose ports have no pose input.
 
-    reference : the vessel in whose axes the group is put together
-    joints    : the others, parents first
+    reference : the vessel whose axes are those of the group
+    joints    : the joints to its other vessels, parents first
     """
 
     reference: str
@@ -52,16 +53,17 @@ class VesselGroup:
 
     @property
     def vessels(self) -> tuple[str, ...]:
+        """Names of its vessels, the reference first."""
         return (self.reference, *(joint.child for joint in self.joints))
 
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """A way by which a group hangs on the root; it counts while every dock on it is closed.
+    """A path of joints from the root to a group, which holds the group while every dock on it is closed.
 
-    group  : number of the group
-    joint  : the last on the way; None: the root's own group
-    before : the way of the group that this joint starts from
+    group  : number of the group at its end
+    joint  : last joint of the path; None for the root's own group
+    before : the way to the group of that joint's parent; None for the root's own group
     """
 
     group: int
@@ -70,11 +72,12 @@ class Way:
 
     @property
     def docks(self) -> tuple[str, ...]:
-        """Names of the inputs that must be true."""
+        """Names of the docks on the way that inputs close, from the root on."""
         names = [way.joint.dock for way in self._backwards() if way.joint and way.joint.dock]
         return tuple(reversed(names))
 
     def passes(self, group: int) -> bool:
+        """Whether the way leads over or to a group, given by its number."""
         return any(way.group == group for way in self._backwards())
 
     def _backwards(self) -> "Iterator[Way]":
@@ -105,9 +108,10 @@ def groups(scene: Scene) -> tuple[VesselGroup, ...]:
 
 
 def ways(scene: Scene, parts: Sequence[VesselGroup]) -> list[list[Way]]:
-    """Returns the ways by which each group may hang on the root.
+    """Returns of each group the ways by which it may hang on the root, shortest first.
 
-    Raises TooManyWaysError.
+    parts : the groups, as `groups` returns them
+    Raises TooManyWaysError beyond MOST_WAYS, MOST_WAYS_IN_ALL or MOST_PASSED.
     """
     home = {vessel: number for number, part in enumerate(parts) for vessel in part.vessels}
     neighbours = _neighbours(scene, scene.docks)
@@ -142,7 +146,7 @@ def switchable(scene: Scene, dock: Dock) -> bool:
 
 
 def _neighbours(scene: Scene, docks: Sequence[Dock]) -> dict[str, list[Joint]]:
-    """Returns the docks of each vessel that has any, seen from it."""
+    """Returns by vessel the joints that start from it, one for each of its docks."""
     neighbours: dict[str, list[Joint]] = {}
     for dock in docks:
         name = dock.name if switchable(scene, dock) else None
@@ -154,7 +158,10 @@ def _neighbours(scene: Scene, docks: Sequence[Dock]) -> dict[str, list[Joint]]:
 
 
 def _spread(start: str, neighbours: Mapping[str, Sequence[Joint]]) -> Iterator[Joint]:
-    """Yields joints from a vessel outwards, parents first, each vessel once."""
+    """Yields joints from a vessel outwards, parents first: one joint to each vessel that is reached.
+
+    neighbours : by vessel, the joints that start from it
+    """
     placed, waiting = {start}, deque([start])
     while waiting:
         for joint in neighbours.get(waiting.popleft(), ()):

@@ -1,7 +1,6 @@
-"""What a scene means, found once: its variables, the rigid groups of its vessels, and how they hang together.
+"""A scene resolved once: its variables, the rigid groups of its vessels, and the docks between these groups.
 
-Everything that comes after reading a scene asks this value, and the scene itself only for the numbers that
-stand in it.
+Code that comes after the reading of a scene takes all this from here, and only numbers from the scene itself.
 """
 
 from collections.abc import Mapping
@@ -31,18 +30,18 @@ from supervessel.scene.variables import (
 )
 
 Lump = tuple[float, NDArray[np.float64], NDArray[np.float64]]
-"""Mass [kg], centre (3,) [m] and inertia (3, 3) [kg m2] of a body, in the axes of its group."""
+"""Mass [kg], centre of mass (3,) [m] and inertia about it (3, 3) [kg m2] of a body, group axes."""
 
 
 @dataclass(frozen=True, eq=False)
 class RigidGroup:
     """Vessels that never move relative to each other.
 
-    reference : the vessel in whose axes the group is put together
-    inside    : poses of its vessels in these axes, constants
+    reference : the vessel whose axes are the group's axes
+    inside    : by vessel, its pose in the group's axes, a constant
     ways      : the ways by which the group may hang on the root
     fixed     : its vessels of constant mass and moments as one body, None where there are none
-    varying   : its other vessels, in the order in which they are added up
+    varying   : names of its other vessels, in the order of summation
     """
 
     reference: str
@@ -54,31 +53,31 @@ class RigidGroup:
 
 @dataclass(frozen=True, eq=False)
 class ResolvedScene:
-    """A scene with what follows from it; see `resolve`.
+    """A scene with all that follows from it before any equation; made by `resolve`.
 
-    Each of its properties is found when it is first asked for, and stays.
+    Each property is found at its first use and kept.
     """
 
     scene: Scene
 
     @cached_property
     def inputs(self) -> tuple[InputVariable, ...]:
-        """The inputs in the order of the model description: what shapes the composite, contact, actions."""
+        """All inputs in the order of the model description: `shaping`, `contact`, `acting`."""
         return input_variables(self.scene)
 
     @cached_property
     def shaping(self) -> tuple[InputVariable, ...]:
-        """The inputs that shape the composite, p."""
+        """The inputs p that shape the composite: masses, moments, poses and motion of ports, docks."""
         return tuple(variable for variable in self.inputs if variable.part == "shape")
 
     @cached_property
     def contact(self) -> tuple[InputVariable, ...]:
-        """The inputs that are the motion with which parts dock, k."""
+        """The inputs k: the motion with which parts dock."""
         return tuple(variable for variable in self.inputs if variable.part == "contact")
 
     @cached_property
     def acting(self) -> tuple[InputVariable, ...]:
-        """The inputs that act, u."""
+        """The inputs u that act: torques and forces."""
         return tuple(variable for variable in self.inputs if variable.part == "action")
 
     @cached_property
@@ -135,7 +134,7 @@ class ResolvedScene:
 
     @cached_property
     def home(self) -> Mapping[str, RigidGroup]:
-        """The group of each vessel."""
+        """By vessel, its rigid group."""
         return {vessel: group for group in self.groups for vessel in group.inside}
 
     def _group(self, graph: VesselGroup, inside: Places, hanging: list[Way]) -> RigidGroup:
@@ -146,5 +145,5 @@ class ResolvedScene:
 
 @reused
 def resolve(scene: Scene) -> ResolvedScene:
-    """Returns what a scene means; of the latest scene the same value again."""
+    """Returns a scene resolved; called again for the latest scene it returns the same value."""
     return ResolvedScene(scene)

@@ -13,14 +13,15 @@ from supervessel.shell.interrupts import interrupt_afterwards
 from supervessel.simplification import simplification
 
 LONGEST_EXPONENT = 200
-"""Binary exponent of a length beyond which p_start scales a direction: its fourth power is no double."""
+"""Largest size of the binary exponent of a direction that p_start leaves as it is: the fourth power of its
+length neither under- nor overflows."""
 
 
 def p_start(scene: Scene) -> NDArray[np.float64]:
     """Returns the scene's values of p, (n,), each in the unit of its input.
 
-    A direction whose square would under- or overflow is scaled by a power of two, as the FMU does: its length
-    has no meaning.
+    A direction beyond LONGEST_EXPONENT is scaled by a power of two, as the FMU does: its length has no
+    meaning.
     """
     values = []
     for variable in resolve(scene).shaping:
@@ -35,7 +36,10 @@ def p_start(scene: Scene) -> NDArray[np.float64]:
 @interrupt_afterwards()
 @simplification(True)
 def composite_at_start(scene: Scene) -> dict[str, NDArray[np.float64]]:
-    """Returns the parts of c by name, (n,) each, for the scene's own values of the inputs."""
+    """Returns the parts of c by name, (n,) each, for the scene's own values of the inputs.
+
+    Units and axes are those of `parts.composite_parts`.
+    """
     graph = composite_graph(resolve(scene))
     values = np.array(ca.Function("composite", [graph.p], [graph.c])(p_start(scene))).ravel()
     return {name: values[place] for name, place in graph.slices.items()}

@@ -1,4 +1,4 @@
-"""Equations that stand in a scene's composite once for each vessel, put together once."""
+"""Equations that a scene's composite repeats for each vessel: each is made a graph once, then reused."""
 
 from collections.abc import Callable
 
@@ -6,10 +6,11 @@ import casadi as ca
 
 
 def inlined(*sizes: tuple[int, ...]) -> Callable[[Callable[..., ca.SX]], Callable[..., ca.SX]]:
-    """Returns a decorator for a function of dense symbols: the same operations, in a small part of the time.
+    """Returns a decorator by which a function of CasADi expressions is evaluated from a graph made once.
 
-    sizes : shapes of the arguments
-    What is constant in a call folds as it does where the function is written out.
+    sizes : shapes of the function's arguments, which must be dense and are given by position
+    The operations are the same as without the decorator, and constants fold likewise; a call takes a small
+    part of the time.
     """
 
     def decorator(function: Callable[..., ca.SX]) -> Callable[..., ca.SX]:

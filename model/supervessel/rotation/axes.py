@@ -10,7 +10,7 @@ from supervessel.derivatives import GivenDerivative
 from supervessel.layout import stacked
 from supervessel.rotation.attitude import rotation_matrix
 from supervessel.rotation.laws import LAWS, principal_products
-from supervessel.rotation.principal import principal, principal_forward, quaternion
+from supervessel.rotation.principal import principal, principal_forward, quaternion_of_axes
 from supervessel.rotation.propagators import Plan
 
 
@@ -47,7 +47,7 @@ def axes_graph(resolved: ResolvedScene, plan: Plan, inertia: ca.SX, products: ca
         moments, R_body_principal = principal(LAWS[rotation.law].turning(inertia))
     if shown:
         own = (moments, R_body_principal) if rotation.law == "tensor" else principal(inertia)
-        parts["principal"] = ca.vertcat(own[0], quaternion(own[1]))
+        parts["principal"] = ca.vertcat(own[0], quaternion_of_axes(own[1]))
     if plan.free != "never":
         parts["free"] = ca.vertcat(moments, ca.vec(R_body_principal))
     if series_turn:

@@ -64,7 +64,7 @@ def principal(inertia: ca.SX) -> tuple[ca.SX, ca.SX]:
     return ca.vertcat(*moments), _least_turned(_orthonormal(_matrix(V)))
 
 
-def quaternion(R_body_principal: ca.SX) -> ca.SX:
+def quaternion_of_axes(R_body_principal: ca.SX) -> ca.SX:
     """Returns q_body_principal, (4,), of unit length and scalar part > 0.
 
     R_body_principal : (3, 3), trace at least 0, from `principal`
@@ -92,7 +92,7 @@ def principal_forward(moments: ca.SX, R_body_principal: ca.SX, d_inertia: ca.SX)
     turn = ca.vertcat(
         *(change[i, j] / _gap(moments[i] - moments[j], moments[2]) for i, j in ((1, 2), (2, 0), (0, 1)))
     )
-    return ca.diag(change), attitude_dot(quaternion(R_body_principal), turn)
+    return ca.diag(change), attitude_dot(quaternion_of_axes(R_body_principal), turn)
 
 
 def _gap(difference: ca.SX, largest: ca.SX) -> ca.SX:
