@@ -1,4 +1,8 @@
-"""Directional derivatives of CasADi expressions, forward and reverse, as functions."""
+"""Directional derivatives of CasADi expressions, forward and reverse, as functions.
+
+Forward derivatives take a small change (seed) of each argument to the change of each result, J dv; reverse
+derivatives take a weight of each result to the weight of each argument, J^T w; J is the Jacobian matrix.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,9 +16,9 @@ from supervessel.layout import split
 class GivenDerivative:
     """A quantity whose derivative is given in closed form, so that CasADi need not differentiate it.
 
-    value    : symbols of the quantity, (n,); it depends on the last argument of what is differentiated
-    small    : symbols of a small change of that argument
-    response : the change of the quantity, (n,), that this small change makes; linear in `small`
+    value    : symbols of the quantity, (n,); it depends on the last argument of the results alone
+    small    : symbols of a small change of that argument, (m,)
+    response : the change of the quantity, (n,), by that small change; an expression linear in `small`
     """
 
     value: ca.SX
@@ -29,8 +33,8 @@ def derivatives(
 
     NAME_forward : arguments, then a small change of each -> the change of each result
     NAME_reverse : arguments, then a weight of each result -> the weight of each argument
-    given        : a quantity in the results with a derivative of its own; its value is one more argument of
-                   both functions, after the others, without a change or weight
+    given        : a quantity in the results whose derivative is given; its value is one more argument of both
+                   functions, after the others, and has no change or weight of its own
     """
     together, changed = ca.vertcat(*arguments), ca.vertcat(*results)
     seeds = [ca.SX.sym(f"d{i}", argument.numel()) for i, argument in enumerate(arguments)]

@@ -1,19 +1,21 @@
 """The equations of one scene as CasADi functions: what the FMU is generated from and what the twin evaluates.
 
-Symbols, each a vector:
+Symbols, each a column vector; units and axes are those of the FMU's variables:
 
-    p : the inputs that shape the composite (masses, moments, poses, docks)
-    k : the motion with which parts dock
-    u : the inputs that act (torques, forces)
-    x : the state (attitude, angular velocity), (7,)
-    z : the state of model exchange: x, or (attitude, angular momentum) where every change keeps that
+    p : the inputs that shape the composite: masses [kg], moments [m2], poses and motions of ports, docks
+    k : the motion with which parts dock, velocities [m/s] and rates [rad/s]
+    u : the inputs that act, torques [N m] and forces [N]
+    x : the state, (7,): attitude q_inertial_body, angular velocity [rad/s], body axes
+    z : the state of model exchange, (7,): x, or attitude and angular momentum [N m s], body axes, where every
+        change of inputs keeps the momentum; see `rotation.exchange`
     c : everything that follows from p alone, see `composite.parts`
     a : principal moments and axes, which follow from c, see `rotation.axes`
-    e : the estimated error of the last step, which the output error_estimate shows
-    y : the outputs in the scene's order
+    e : estimated error of the last communication step [rad], which the output error_estimate shows
+    y : the outputs in the scene's order, see `scene.outputs`
 
-c is computed when p changes, a when c has changed and somebody asks for a. An element of c that is constant
-in this scene is a number in the functions of c: they do not read that argument.
+c is computed when p changes; a is computed when it is needed and c has changed. An element of c that is
+constant in this scene is a number in the functions of c: they do not read that element of the argument.
+Source of the equations: model/docs/equations.md, [EQ].
 """
 
 from collections.abc import Mapping
@@ -57,7 +59,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class VariableNames:
-    """Names of the elements of p, k, u, z and y as the FMU has them."""
+    """Names that the FMU gives to the elements of p, k, u, z and y."""
 
     p: tuple[str, ...]
     k: tuple[str, ...]
@@ -68,7 +70,7 @@ class VariableNames:
 
 @dataclass(frozen=True)
 class Slices:
-    """Where the parts stand in c (`composite`) and in a (`axes`), by name."""
+    """The places of the parts of c (`composite`) and of a (`axes`), by name."""
 
     composite: Mapping[str, slice]
     axes: Mapping[str, slice]
@@ -78,10 +80,10 @@ class Slices:
 class ExchangeFunctions:
     """Functions of the states z of model exchange.
 
-    ode      : z, u, c -> rate of z
+    ode      : z, u, c -> rate of z [1/s, rad/s2 or N m]
     outputs  : z, u, c, a, e -> y
-    forward  : z, u, c, a, then small changes of z, u, c -> those of the rate of z and of y
-    reverse  : z, u, c, a, then weights of the rate of z and of y -> those of z, u, c
+    forward  : z, u, c, a, then small changes of z, u, c -> changes of the rate of z and of y
+    reverse  : z, u, c, a, then weights of the rate of z and of y -> weights of z, u, c
     """
 
     ode: ca.Function
@@ -96,16 +98,17 @@ class Equations:
 
     resolved        : the scene
     plan            : the method of its co-simulation
-    names, slices   : of variables, of the parts of c and a
-    composite_graph : p and c in symbols, of which the composite's derivatives are made
+    names           : of the elements of p, k, u, z and y
+    slices          : places of the parts of c and a
+    composite_graph : p and c in symbols
     composite       : p -> c
     axes            : c -> a
-    ode             : x, u, c -> rate of x
+    ode             : x, u, c -> rate of x [1/s, rad/s2]
     outputs         : x, u, c, a, e -> y
-    product_count   : number of products of two rates in the law's gyroscopic term in this scene
+    product_count   : number of products of two rates in the gyroscopic term, see `steps.map_of_products`
     steps           : functions of steps in time
     exchange        : functions of model exchange
-    change          : what happens to the rate when inputs change; None where it never changes with them
+    change          : how the angular velocity changes with the inputs; None where it never does
     changing        : the functions of `change` that the FMU needs, with derivatives
     """
 
@@ -126,7 +129,7 @@ class Equations:
 
     @cached_property
     def composite_derivatives(self) -> tuple[ca.Function, ca.Function]:
-        """composite_forward and composite_reverse, made when they are first asked for."""
+        """composite_forward and composite_reverse, see `derivatives`; made at their first use."""
         with interrupt_afterwards(), simplification(True):
             return derivatives("composite", [self.composite_graph.p], [self.composite_graph.c])
 
@@ -153,9 +156,9 @@ class Equations:
 @interrupt_afterwards()
 @simplification(True)
 def equations(scene: Scene) -> Equations:
-    """Returns the equations of a scene, folded for what it holds constant.
+    """Returns the equations of a scene; what the scene holds constant is folded to numbers.
 
-    Raises ValueError for a scene whose law is still to be chosen.
+    Raises ValueError for a scene whose law is still to be chosen, `Scene.is_chosen`.
     """
     plan, resolved = plan_of(scene), resolve(scene)
     names, graph = _names(resolved), composite_graph(resolved)

@@ -14,15 +14,15 @@ from supervessel.rotation.attitude import to_inertial, unit
 
 @dataclass(frozen=True)
 class Known:
-    """What outputs follow from.
+    """The quantities that outputs are computed from.
 
-    resolved : the scene whose outputs they are
-    attitude : (4,), of unit length
+    resolved : the scene
+    attitude : q_inertial_body, (4,), of unit length
     omega    : angular velocity, (3,) [rad/s], body axes
-    u        : the inputs that act
-    parts    : those of the composite by name, see `composite.parts`; "principal", moments and axes,
-               (7,), zeros where nobody asks; "error_estimate" [rad]
-    inertia  : tensor about the barycentre, (3, 3) [kg m2], body axes
+    u        : the inputs that act, (m,) [N m, N]
+    parts    : by name, the parts of c, see `composite.parts`; "principal", the part of a, (7,), zeros where
+               no output shows it; "error_estimate" [rad]
+    inertia  : J about the barycentre, (3, 3) [kg m2], body axes
     """
 
     resolved: ResolvedScene
@@ -34,11 +34,12 @@ class Known:
 
     @cached_property
     def turned(self) -> ca.SX:
-        """J omega, (3,) [N m s]: angular momentum without that of what moves relative to the body axes."""
+        """J omega, (3,) [N m s], body axes: the angular momentum without that of moving parts, h."""
         return self.inertia @ self.omega
 
 
 def _momentum(known: Known) -> ca.SX:
+    """Returns J omega + h, (3,) [N m s], inertial axes."""
     turned, parts = known.turned, known.parts
     momentum = turned + parts["momentum"][:3] if "momentum" in parts else turned
     return to_inertial(known.attitude, momentum)
@@ -58,16 +59,20 @@ EXPRESSIONS: dict[str, Callable[[Known], ca.SX]] = {
     "error_estimate": lambda known: known.parts["error_estimate"],
     "net_force": lambda known: net_force(known.resolved, known.parts, known.u),
 }
-"""Of outputs of the whole, by name; those of vessels are in `composite.actions.vessel_outputs`."""
+"""By name of an output of the whole, its expression; `composite.actions.vessel_outputs` has those of vessels.
+
+`scene.outputs` says units and axes.
+"""
 
 
 def outputs_of(resolved: ResolvedScene, x: ca.SX, u: ca.SX, parts: Mapping[str, ca.SX]) -> ca.SX:
-    """Returns the scene's outputs, in its order.
+    """Returns the scene's outputs in its order, y, (n,).
 
-    x     : attitude and angular velocity, (7,)
+    x     : attitude q_inertial_body and angular velocity [rad/s], body axes, (7,)
+    u     : the inputs that act, (m,) [N m, N]
     parts : see `Known`
-    The attitude is brought to unit length once more: as a state it keeps it only to the accuracy of
-    whoever integrates it.
+    The attitude is brought to unit length here: as a state it keeps its length only as accurately as it is
+    integrated.
     """
     attitude, omega = unit(x[:4]), x[4:]
     known = Known(resolved, attitude, omega, u, parts, from_upper_triangle(parts["inertia"]))

@@ -22,19 +22,19 @@ COMPOSITE_SIZES = {"mass": 1, "barycentre": 3, "inertia": 6, "pmi": 3, "margins"
 """Sizes of the parts with which every c begins.
 
 mass       : [kg]
-barycentre : [m], in the root vessel's axes
-inertia    : about the barycentre [kg m2], body axes: upper triangle xx, yy, zz, xy, xz, yz
-pmi        : mass-normalised diagonal moments [m2]
-margins    : pivots of J = L D L^T [kg m2], each less what rounding may leave of a pivot that is zero; all are
-             positive where the tensor is positive definite as far as doubles can tell
+barycentre : [m], from the root vessel's origin, root axes
+inertia    : J about the barycentre [kg m2], body axes: xx, yy, zz, xy, xz, yz
+pmi        : diagonal of J over mass [m2]
+margins    : pivots of J = L D L^T, each less PIVOT_SLACK [kg m2]; all three are positive where J is positive
+             definite as far as doubles can tell
 """
 
 PIVOT_SLACK = 16.0 * EPSILON
-"""What rounding may leave of a pivot that is zero, over the element J_kk that the pivot was taken from.
+"""Bound of what rounding leaves of a pivot that is exactly zero, over the element J_kk of its row.
 
-The elements of a composite tensor are each off by a few u of sqrt(J_ii J_jj), which bounds |J_ij|. So the
-second pivot of L D L^T is off by a few u of J_22, and the third by a few u of J_33 J_22/d_2: what the second
-row takes from the third pivot is divided by the second row's own pivot d_2.
+Each element of a composite tensor is off by a few u of sqrt(J_ii J_jj), which bounds |J_ij|. So the second
+pivot of L D L^T is off by a few u of J_22. The third pivot is off by a few u of J_33 J_22/d_2, d_2 the second
+pivot: the elimination of the second row divides by d_2.
 """
 
 
@@ -52,20 +52,20 @@ class CompositeGraph:
     slices: Mapping[str, slice]
 
     def parts(self, symbols: ca.SX) -> dict[str, ca.SX]:
-        """Returns the parts by name, of symbols that stand for c; elements that are constant are numbers."""
+        """Returns the parts of c by name, in terms of `symbols` of c, (m,); constant elements are numbers."""
         elements = zip(ca.vertsplit(self.c), ca.vertsplit(symbols), strict=True)
         known = ca.vertcat(*(own if own.is_constant() else symbol for own, symbol in elements))
         return {name: known[place] for name, place in self.slices.items()}
 
 
 def composite_slices() -> dict[str, slice]:
-    """Returns where the parts stand with which every c begins."""
+    """Returns the places in c of the parts of COMPOSITE_SIZES, with which every c begins, by name."""
     return slices_of(COMPOSITE_SIZES)
 
 
 @reused
 def composite_graph(resolved: ResolvedScene) -> CompositeGraph:
-    """Returns the composite of a scene; the check of a scene and its equations share it."""
+    """Returns the composite of a scene in symbols. The check of a scene and its equations share it."""
     p = ca.SX.sym("p", len(resolved.shaping))
     slices, c = stacked(composite_parts(resolved, p))
     return CompositeGraph(p, c, slices)
@@ -77,8 +77,9 @@ def composite_parts(resolved: ResolvedScene, p: ca.SX) -> dict[str, ca.SX]:
     The parts of COMPOSITE_SIZES come first. Then, each where the scene has it:
 
     law           : the numbers that the rotation law needs, see `rotation.laws`
-    momentum      : (4,), where ports move: angular momentum h, (3,) [N m s], of the parts that move relative
-                    to the body axes, and the square, [rad2/s2], of a bound of |J^-1 (omega x h)|/|omega|
+    momentum      : (4,), where ports move: angular momentum h, (3,) [N m s], body axes, of the parts that
+                    move relative to body axes; and the square, [rad2/s2], of |h| trace(J^-1), which bounds
+                    |J^-1 (omega x h)|/|omega|
     moment, force : see `composite.actions.action_parts`
     .NAME         : of the vessel NAME, see `composite.actions.vessel_parts`
     """
@@ -112,7 +113,7 @@ def body_parts(scene: Scene, body: Body) -> dict[str, ca.SX]:
 
 
 def _margins(inertia: ca.SX, pivots: ca.SX, may_be_point: bool) -> ca.SX:
-    """Returns by how much the pivots of a tensor exceed what rounding leaves of zero, (3,) [kg m2]."""
+    """Returns the pivots of a tensor less what rounding leaves of a pivot that is zero, (3,) [kg m2]."""
     J = inertia
     divisor = ca.if_else(pivots[1] == 0.0, 1.0, pivots[1]) if may_be_point else pivots[1]
     return ca.vertcat(
