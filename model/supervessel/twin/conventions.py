@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def acados_model(twin: "Twin", step: float | None) -> Any:
-    """Returns an `AcadosModel`, see `Twin.to_acados`."""
+    """Returns an `AcadosModel`; arguments, contents and errors are those of `Twin.to_acados`."""
     from acados_template import AcadosModel  # noqa: PLC0415
 
     model = AcadosModel()
@@ -26,7 +26,7 @@ def acados_model(twin: "Twin", step: float | None) -> Any:
 
 
 def do_mpc_model(twin: "Twin", step: float | None) -> Any:
-    """Returns a `do_mpc.model.Model`, see `Twin.to_do_mpc`."""
+    """Returns a `do_mpc.model.Model`; arguments, contents and errors are those of `Twin.to_do_mpc`."""
     from do_mpc.model import Model  # noqa: PLC0415
 
     model = Model("continuous" if step is None else "discrete", "SX")

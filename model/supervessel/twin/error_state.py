@@ -1,12 +1,14 @@
 """The error of a state about a reference, six numbers, and its inverse, in CasADi symbols.
 
-The error is that of the body's attitude seen from the reference, q_e = q_ref* q, in body axes, then the
-difference of the rates. q and -q give the same error: the sign of q_e is taken so that its scalar part is not
-negative. Three forms, all equal to the angle [rad] about each axis to first order:
+A state is (7,): q_inertial_body, of unit length, and omega [rad/s], body axes. The reference has body axes of
+its own. The error is (6,): of the attitude, from q_reference_body = q_ref* q = (w, v), then the difference
+omega - omega_ref of the components [rad/s]. q and -q give the same error: the sign of q_reference_body is
+chosen so that w is not negative. For a turn by the angle alpha about a unit vector n, w = cos(alpha/2) and
+v = n sin(alpha/2), the three forms of the attitude's error, (3,), all equal alpha n [rad] to first order:
 
-vec    : 2 vec(q_e), a polynomial; from 0 to 2 in length, flat at a half turn
-rotvec : the rotation vector, angle times axis; from 0 to pi
-mrp    : 4 vec(q_e) / (1 + scalar part), modified Rodrigues parameters; from 0 to 4
+vec    : 2 v, a polynomial; from 0 to 2 in length, flat at a half turn
+rotvec : alpha n, the rotation vector; from 0 to pi in length
+mrp    : 4 v/(1 + w) = 4 n tan(alpha/4), four times the modified Rodrigues parameters; from 0 to 4 in length
 """
 
 from typing import Literal
@@ -18,30 +20,33 @@ from supervessel.rotation.attitude import attitude_dot, product
 ErrorForm = Literal["vec", "rotvec", "mrp"]
 
 ARCTANGENT_TERMS = 14
-"""Of the series of arctan(y)/y in y^2 for y <= tan(pi/16): the first term left out is 7e-22, and 2e-17 in the
-second derivative."""
+"""Terms of the series of arctan(y)/y in y^2, for y <= tan(pi/16): the first term left out is 7e-22, and 2e-17
+in the second derivative."""
 
 SERIES_LIMIT = 0.25
 """Square of half an angle [rad2] below which cosine and sine are series: beyond it, sin(a)/a loses
 2/0.25^2 = 32 u in its second derivative."""
 
 SERIES_TERMS = 10
-"""Of the series of cos(a) and sin(a)/a in a^2 up to SERIES_LIMIT: the first term left out is 4e-25."""
+"""Terms of the series of cos(a) and sin(a)/a in a^2, up to SERIES_LIMIT: the first term left out is 4e-25."""
 
 
 def state_error(state: ca.SX, reference: ca.SX, form: ErrorForm) -> ca.SX:
-    """Returns attitude error and difference of rates, (6,) [rad, rad/s], body axes.
+    """Returns the error, (6,) [rad, rad/s], body axes.
 
-    state, reference : (7,), attitude of unit length and angular velocity [rad/s]
+    state, reference : (7,), see the module
     """
-    turned = product(_conjugate(reference[:4]), state[:4])
-    turned = turned * ca.if_else(turned[0] < 0.0, -1.0, 1.0)
-    return ca.vertcat(attitude_error(turned, form), state[4:] - reference[4:])
+    q_reference_body = product(_conjugate(reference[:4]), state[:4])
+    q_reference_body = q_reference_body * ca.if_else(q_reference_body[0] < 0.0, -1.0, 1.0)
+    return ca.vertcat(attitude_error(q_reference_body, form), state[4:] - reference[4:])
 
 
-def attitude_error(turned: ca.SX, form: ErrorForm) -> ca.SX:
-    """Returns the error, (3,) [rad], of a quaternion, (4,), of unit length and scalar part not negative."""
-    w, v = turned[0], turned[1:]
+def attitude_error(q_reference_body: ca.SX, form: ErrorForm) -> ca.SX:
+    """Returns the attitude's error, (3,) [rad], body axes.
+
+    q_reference_body : (4,), of unit length, scalar part not negative
+    """
+    w, v = q_reference_body[0], q_reference_body[1:]
     if form == "vec":
         return 2.0 * v
     tangents = v / (1.0 + w)  # axis times the tangent of a fourth of the angle
@@ -58,16 +63,17 @@ def attitude_error(turned: ca.SX, form: ErrorForm) -> ca.SX:
 
 
 def retracted(reference: ca.SX, error: ca.SX, form: ErrorForm) -> ca.SX:
-    """Returns the state, (7,), that has an error, (6,), about a reference, (7,): `state_error` inverted.
+    """Returns the state, (7,), that has an error about a reference: `state_error` inverted.
 
-    The attitude is as long as the reference's; NaN for "vec" where the attitude's error is longer than 2.
+    reference : (7,); the state's attitude has the length of the reference's
+    error     : (6,) [rad, rad/s]; NaN is returned for "vec" where the attitude's error is longer than 2
     """
-    turned = turn(error[:3], form)
-    return ca.vertcat(product(reference[:4], turned), reference[4:] + error[3:])
+    q_reference_body = turn(error[:3], form)
+    return ca.vertcat(product(reference[:4], q_reference_body), reference[4:] + error[3:])
 
 
 def turn(error: ca.SX, form: ErrorForm) -> ca.SX:
-    """Returns the unit quaternion, (4,), of an attitude error, (3,) [rad]."""
+    """Returns q_reference_body, (4,), of unit length, of an attitude's error, (3,) [rad]."""
     if form == "vec":
         half = 0.5 * error
         return ca.vertcat(ca.sqrt(1.0 - ca.sumsqr(half)), half)
@@ -81,7 +87,7 @@ def turn(error: ca.SX, form: ErrorForm) -> ca.SX:
 
 
 def _cosine_and_sine_over(square: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Returns cos(a) and sin(a)/a of the square of an angle, smooth at zero."""
+    """Returns cos(a) and sin(a)/a, smooth at zero; square : a^2 [rad2]."""
     small = square < SERIES_LIMIT
     within = ca.if_else(small, square, 0.0)
     cosine, sine_over = ca.SX(0.0), ca.SX(0.0)
@@ -100,23 +106,31 @@ def error_rate(
 ) -> ca.SX:
     """Returns the rate of an error, (6,) [rad/s, rad/s2], as the body and its reference move.
 
-    rate_reference : (3,) [rad/s]; the body's rate is that and the error's second half
-    accelerations  : (3,) [rad/s2], of the body and of the reference, each in its own axes
-    With q_e' = (q_e omega - omega_ref q_e)/2.
+    error                  : (6,) [rad, rad/s]
+    rate_reference         : omega_ref, (3,) [rad/s], axes of the reference; omega = omega_ref + error[3:]
+    acceleration           : omega', (3,) [rad/s2], body axes
+    acceleration_reference : omega_ref', (3,) [rad/s2], axes of the reference
+    q_e = q_reference_body = q_ref* q has the rate q_e' = (q_e (0, omega) - (0, omega_ref) q_e)/2, by the rate
+    of an attitude, [EQ] Conventions. The rate of the attitude's error is its derivative by q_e times q_e'.
     """
     q = ca.SX.sym("q", 4)
     q_dot = ca.SX.sym("q_dot", 4)
     by_turn = ca.Function("by_turn", [q, q_dot], [ca.jtimes(attitude_error(q, form), q, q_dot)])
-    turned = turn(error[:3], form)
-    backwards = product(ca.vertcat(0.0, 0.5 * rate_reference), turned)
-    turned_dot = attitude_dot(turned, rate_reference + error[3:]) - backwards
-    return ca.vertcat(by_turn(turned, turned_dot), acceleration - acceleration_reference)
+    q_reference_body = turn(error[:3], form)
+    by_reference = product(ca.vertcat(0.0, 0.5 * rate_reference), q_reference_body)
+    q_dot_value = attitude_dot(q_reference_body, rate_reference + error[3:]) - by_reference
+    return ca.vertcat(by_turn(q_reference_body, q_dot_value), acceleration - acceleration_reference)
 
 
 def tangent(attitude: ca.SX) -> ca.SX:
-    """Returns the change of an attitude, (4, 3), by a small error: d retract / d error at zero."""
+    """Returns the derivative of an attitude by a small error of it, (4, 3) [1/rad]: columns q (0, e_i)/2.
+
+    attitude : q = q_inertial_body, (4,); e_i are the unit vectors of body axes
+    It is the derivative of `retracted` at zero error, of every form.
+    """
     return ca.horzcat(*(attitude_dot(attitude, axis) for axis in ca.horzsplit(ca.SX.eye(3))))
 
 
 def _conjugate(quaternion: ca.SX) -> ca.SX:
+    """Returns (w, -v) of (w, v), (4,)."""
     return ca.vertcat(quaternion[0], -quaternion[1:])

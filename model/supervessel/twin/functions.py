@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from supervessel.problems import unknown
 
 UNIT_SLACK = 1e-3
-"""By how much the length of an attitude may differ from 1: what loose integration leaves (SciPy's rtol is
-1e-3) passes, a quaternion that was never normalised or was rounded to two digits does not."""
+"""Largest difference from 1 of the length of an attitude in a call. The drift of a loose integration passes
+(SciPy's rtol is 1e-3); a quaternion that was never normalised, or was rounded to two digits, does not."""
 
 STATES = ("x", "x_ref")
 """Arguments whose first four elements are an attitude."""
@@ -20,13 +20,14 @@ SYMBOLS = (ca.SX, ca.MX)
 
 
 class TwinFunction(ca.Function):
-    """A CasADi function of the twin: `ca.Function` in every way, but numbers given in a call are checked.
+    """A CasADi function of the twin: a `ca.Function` that also checks the numbers it is called with.
 
-    Refused, with what is wanted: missing and unknown arguments, sizes other than the argument's (CasADi takes
-    one number for a whole vector), numbers that are not finite, and attitudes whose length is not 1 within
-    UNIT_SLACK, but by `ode`, `outputs` and `longest_step`, which take any length. Of symbols only the sizes
-    are checked. In a call by name u and acceleration_ref may be left out, which means zero, and so may p,
-    which means the scene's values. `map`, `mapaccum` and `fold` give such functions again.
+    A call raises ValueError, with what is allowed, for missing and unknown arguments, for sizes other than
+    the argument's (CasADi itself takes one number for a whole vector), for numbers that are not finite, and
+    for attitudes whose length is not 1 within UNIT_SLACK; `ode`, `outputs` and `longest_step` take attitudes
+    of any length. Of symbols only the sizes are checked. In a call by name u and acceleration_ref may be left
+    out and are then zero; p may be left out and then has the scene's values. `map`, `mapaccum` and `fold`
+    return functions that check in the same way.
 
     Example:
         >>> from supervessel import Twin, load_scene
@@ -43,7 +44,10 @@ class TwinFunction(ca.Function):
         self._sizes: dict[str, tuple[int, int]] = {name: self.size_in(name) for name in self.name_in()}
 
     def __call__(self, *args: Any, **named: Any) -> Any:
-        """Returns what the function does: a value, a tuple of values, or by names a dictionary."""
+        """Returns the results: one value, or a tuple of values; of a call by name a dictionary by name.
+
+        Raises ValueError, see the class.
+        """
         names = list(self._sizes)
         if named and args:
             raise ValueError(f"{self.name()}: arguments are either all named or all in order")
@@ -128,7 +132,7 @@ class TwinFunction(ca.Function):
         return f"{self.name()}({', '.join(self._sizes)})"
 
     def _completed(self, named: Mapping[str, Any]) -> dict[str, Any]:
-        """Returns the arguments of a call by name with those that were left out."""
+        """Returns all arguments of a call by name: those given, and the defaults of those left out."""
         names = list(self._sizes)
         for name in named:
             if name not in names:
@@ -144,7 +148,7 @@ class TwinFunction(ca.Function):
         return given
 
     def _checked(self, name: str, value: Any) -> Any:
-        """Returns an argument as CasADi takes it."""
+        """Returns an argument in a form that CasADi takes. Raises ValueError, see the class."""
         rows, columns = self._sizes[name]
         if isinstance(value, list | tuple) and any(isinstance(element, SYMBOLS) for element in value):
             value = ca.vertcat(*value)

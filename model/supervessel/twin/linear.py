@@ -1,4 +1,8 @@
-"""Linear models of the error state, in CasADi symbols. They are the same for each form of the error."""
+"""Linear models of the error state, in CasADi symbols. They are the same for each form of the error.
+
+e = (phi, d omega), (6,) [rad, rad/s], is a small error of the state in body axes, see `error_state`; du and
+dp are small changes of the inputs u that act, (m,), and of the other inputs p, (n,).
+"""
 
 import casadi as ca
 
@@ -6,11 +10,14 @@ from supervessel.twin.error_state import tangent
 
 
 def linear_model(state: ca.SX, torque: ca.SX, p: ca.SX, acceleration: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Returns A (6, 6), B (6, m), E (6, n): rate of a small error by the error, the torque, the inputs p.
+    """Returns A (6, 6), B (6, m), E (6, n) of e' = A e + B du + E dp about a state.
 
-    acceleration : (3,) [rad/s2], expression of state (7,), torque (m,) and p (n,)
-    The attitude's error phi has the rate (change of omega) - omega x phi; its own columns of A in the rows
-    of the rate are zero, as no law knows the attitude.
+    state        : (7,), q_inertial_body and omega [rad/s], body axes
+    torque       : u, (m,) [N m, N]
+    p            : (n,)
+    acceleration : omega', (3,) [rad/s2], body axes, an expression of state, torque and p
+    phi' = d omega - omega x phi: `error_state.error_rate` to first order. d omega' does not depend on phi, as
+    no law depends on the attitude.
     """
     omega = state[4:]
     A = ca.blockcat([[-ca.skew(omega), ca.SX.eye(3)], [ca.SX(3, 3), ca.jacobian(acceleration, state)[:, 4:]]])
@@ -20,10 +27,14 @@ def linear_model(state: ca.SX, torque: ca.SX, p: ca.SX, acceleration: ca.SX) -> 
 
 
 def discrete_model(state: ca.SX, torque: ca.SX, p: ca.SX, end: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Returns A (6, 6), B (6, m), E (6, n): a small error at a step's end by that at its start, torque, p.
+    """Returns A (6, 6), B (6, m), E (6, n) of e_end = A e + B du + E dp over one step.
 
-    end : (7,), the state after the step, expression of state (7,), torque (m,) and p (n,)
-    The tangent at the end, four times its transpose, takes a small change of attitude to its error.
+    state  : (7,), at the start of the step: q_inertial_body and omega [rad/s], body axes
+    torque : u, (m,) [N m, N], held over the step
+    p      : (n,), held over the step
+    end    : (7,), the state at the end of the step, an expression of state, torque and p
+    With T = `error_state.tangent`, (4, 3), a small error phi changes the attitude by T phi, and 4 T^T takes a
+    small change of a unit attitude back to phi: T^T T is a quarter of the unit matrix.
     """
     begun = ca.diagcat(tangent(state[:4]), ca.SX.eye(3))
     ended = ca.diagcat(4.0 * tangent(end[:4]).T, ca.SX.eye(3))
