@@ -1,7 +1,7 @@
-"""What the keys of a scene say of each other: moments, port directions, ranges, steps, the total mass.
+"""Problems between the keys of a scene: moments, port directions, ranges, steps, the total mass.
 
-Works on the raw tables of a file and passes over what is no number, so that these problems are reported
-beside others.
+The raw tables of a file are checked, and values that are no numbers are skipped, so that these problems are
+reported beside those of single values.
 """
 
 import math
@@ -62,7 +62,11 @@ def _no_tensor(place: str, vessel: Mapping[str, Any]) -> Iterator[str]:
 
 
 def direction_problems(place: str, port: Mapping[str, Any]) -> Iterator[str]:
-    """Yields why a port's alignment cannot be used with its direction."""
+    """Yields why a port's alignment cannot be used with its direction.
+
+    place : path of the port in the scene
+    port  : its raw table, direction and alignment in vessel axes
+    """
     direction, alignment = _vector(port, "direction"), _vector(port, "alignment")
     if direction is None or alignment is None:
         return
@@ -77,7 +81,7 @@ def direction_problems(place: str, port: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _vector(table: Mapping[str, Any], key: str) -> Vector | None:
-    """Returns three finite numbers that are not all zero, None where there is something else."""
+    """Returns a key's three finite numbers, not all zero; None where the key has something else."""
     value = table.get(key)
     if isinstance(value, list | tuple) and len(value) == 3 and all(map(is_number, value)) and any(value):
         x, y, z = map(float, value)
@@ -101,7 +105,7 @@ def _experiment(raw: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _accuracy(raw: Mapping[str, Any]) -> Iterator[str]:
-    """Yields why [accuracy] leaves nothing to choose, or asks for what cannot be."""
+    """Yields why [accuracy] cannot be met, or contradicts other keys."""
     accuracy, rotation, inputs = (raw.get(key, {}) for key in ("accuracy", "rotation", "inputs"))
     if "accuracy" not in raw or not isinstance(accuracy, Mapping):
         return
@@ -126,7 +130,7 @@ def _accuracy(raw: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _without_range(inputs: Mapping[str, Any]) -> Iterator[str]:
-    """Yields inputs, docks apart, that have no range; vectors of which no element has one by their name."""
+    """Yields the inputs without a range, docks excepted; a vector by one name if no element has a range."""
     ranges = inputs.get("range")
     known = ranges if isinstance(ranges, Mapping) else {}
     for group, (kind, elements) in by_group(inputs).items():
@@ -165,13 +169,13 @@ def _total_mass(raw: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _number(table: Mapping[str, Any], key: str) -> float:
-    """Returns a finite number, NaN where there is something else."""
+    """Returns a key's finite number, NaN where the key is missing or has something else."""
     value = table.get(key)
     return float(value) if is_number(value) else math.nan  # type: ignore[arg-type]
 
 
 def _propagator(raw: Mapping[str, Any]) -> Iterator[str]:
-    """Yields why a propagator makes no sense with what the scene has."""
+    """Yields why the propagator does not suit the scene's law and inputs."""
     rotation, inputs = (raw.get(key, {}) for key in ("rotation", "inputs"))
     if not (isinstance(rotation, Mapping) and isinstance(inputs, Mapping)):
         return
@@ -183,7 +187,7 @@ def _propagator(raw: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _changes(raw: Mapping[str, Any]) -> Iterator[str]:
-    """Yields why what a change shall keep makes no sense with what the scene has."""
+    """Yields why mass_change or pose_change does not suit the scene's law and inputs."""
     rotation, inputs = (raw.get(key, {}) for key in ("rotation", "inputs"))
     if not (isinstance(rotation, Mapping) and isinstance(inputs, Mapping)):
         return

@@ -1,7 +1,8 @@
-"""The kinds of inputs that a scene may list, one row each: whatever names, checks or uses inputs reads them.
+"""The kinds of inputs that a scene may list, one row each. All code that names, checks or uses inputs reads
+these rows.
 
-A new kind is its row here, its key in `schema.Inputs`, and the place that gives its equation: for what shapes
-the composite `composite.bodies`, for what acts `composite.actions`.
+A new kind needs its row here, its key in `schema.Inputs`, and its equation: in `composite.bodies` if it
+shapes the composite, in `composite.actions` if it acts.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -12,16 +13,16 @@ if TYPE_CHECKING:
     from supervessel.scene.schema import Scene
 
 Part = Literal["shape", "contact", "action"]
-"""Whether an input shapes the composite, is the motion with which a part docks, or acts."""
+"""Use of an input: it shapes the composite, is the motion with which a part docks, or is a torque or force."""
 
 Change = Literal["mass", "pose", "docked", ""]
-"""What changes with an input: masses and moments, poses and their motion, docks; "": none of these."""
+"""What changes with an input: masses and moments; poses and motion of ports; docks; "": none of these."""
 
 Owner = Literal["vessel", "port", "dock", "point", ""]
-"""What the list of a scene names; "": the whole assembly, the key is then true or false."""
+"""What the entries of a list in `[inputs]` name; "": the key is true or false and stands for the assembly."""
 
 Judge = Literal["MASS", "PMI", "PORT", ""]
-"""How the FMU judges the values of an owner together; see CHECK_... in fmu_build/c/variable_table.h."""
+"""The check by which the FMU judges an owner's values together: CHECK_... of fmu_build/c/variable_table.h."""
 
 Values = tuple[float, ...]
 
@@ -30,23 +31,23 @@ Values = tuple[float, ...]
 class InputKind:
     """A kind of input.
 
-    key         : of `[inputs]`, which lists the owners
-    quantity    : last part of the variables' names
-    owner       : what the list names
+    key         : key of `[inputs]`, whose list names the owners
+    quantity    : last part of the variables' names, `mass` in `DG.mass`
+    owner       : what an owner is
     elements    : 3 for a vector, whose variables carry an index from 1; 0 for a scalar
     unit        : as FMI writes it, "" for a pure number
-    part        : of the equations that it belongs to
-    change      : which kind of change its change is
-    description : of the variable, where {owner}, {vessel}, {axis} and of a dock its ports {first}, {second}
-                  and {first_vessel} are filled in
+    part        : its use
+    change      : what changes with it
+    description : text of a variable with places for {owner}, {vessel}, {axis} and, of a dock, for its ports
+                  {first}, {second} and the first one's vessel {first_vessel}
     start       : scene, owner -> the scene's value, element by element
-    lowest      : least value that it can have, None where all are possible
-    noun        : what a problem calls it, "a mass"
+    lowest      : least possible value, None where all values are possible
+    noun        : its name in an error text, "a mass"
     boolean     : whether it is true or false, 1 or 0 as a number
-    directed    : whether only the direction of a vector matters, so that it must not be zero
-    judge       : how the FMU judges it
-    given_by    : key that a vessel's table must have for it, "" for any
-    within      : key of `[inputs]` whose list must have the owner too, "" for none
+    directed    : whether it is a vector of which only the direction matters; it must then not be zero
+    judge       : the check by which the FMU judges it; of an owner's vectors only the first one names it
+    given_by    : key that the owner's table must have, "" for none
+    within      : key of `[inputs]` whose list must name the owner too, "" for none
     """
 
     key: str
@@ -102,12 +103,12 @@ class InputKind:
 
 
 def vessel_of(name: str) -> str:
-    """Returns the vessel's name in that of one of its parts, "vessel.port", or of the vessel itself."""
+    """Returns "vessel" of "vessel.port", "vessel.point" or "vessel"."""
     return name.partition(".")[0]
 
 
 def part_of(name: str) -> tuple[str, str]:
-    """Returns vessel and part of the name of a port or a point, "vessel.part"."""
+    """Returns "vessel" and "part" of "vessel.part", the name of a port or a point."""
     vessel, part = name.split(".")
     return vessel, part
 
@@ -307,12 +308,15 @@ def rows_by_key() -> dict[str, InputKind]:
 
 
 def by_name(inputs: Mapping[str, Any]) -> dict[str, InputKind]:
-    """Returns the kind of each input that the table `[inputs]` asks for, by the names of its variables."""
+    """Returns, by the name of a variable, its kind, for all inputs that the table `[inputs]` lists."""
     return {name: kind for kind, owner in listed(inputs) for name in kind.names(owner)}
 
 
 def by_group(inputs: Mapping[str, Any]) -> dict[str, tuple[InputKind, list[str]]]:
-    """Returns kind and variables' names of each input that `[inputs]` asks for, by its name without index."""
+    """Returns, by the name of an input without index, its kind and the names of its variables.
+
+    inputs : the table `[inputs]`
+    """
     return {kind.group(owner): (kind, kind.names(owner)) for kind, owner in listed(inputs)}
 
 
@@ -324,7 +328,7 @@ def acting(inputs: Mapping[str, Any]) -> bool:
 def listed(inputs: Mapping[str, Any]) -> Iterator[tuple[InputKind, str]]:
     """Yields kind and owner of each input that `[inputs]` asks for, in the order of the model description.
 
-    inputs : the table by its keys, as a file has it; what is missing is empty, what is no name is passed over
+    inputs : the table by its keys, as in a file; a missing list is empty, an entry that is no name is skipped
     """
     for block in BLOCKS:
         owners = {kind.key: _owners(inputs, kind) for kind in block}
@@ -335,7 +339,7 @@ def listed(inputs: Mapping[str, Any]) -> Iterator[tuple[InputKind, str]]:
 
 
 def _owners(inputs: Mapping[str, Any], kind: InputKind) -> dict[str, None]:
-    """Returns whom the inputs of a kind belong to, in order, each once; "" is the whole assembly."""
+    """Returns the owners of the inputs of a kind, in the order of the list, each once; "" is the assembly."""
     value = inputs.get(kind.key)
     if not kind.owner:
         return {"": None} if value is True else {}

@@ -17,7 +17,7 @@ EPSILON = 2.0**-52
 # k1 + k2 >= k3 is judged on decimals read from text: each is off by u = EPSILON/2 relative, the sum by one
 # u more, so a body on the boundary shows an excess of up to 4 u k3.
 TRIANGLE_SLACK = 2.0 * EPSILON
-# What a controlled error may be asked to be; less is below what doubles tell.
+# Range of a tolerance that may be asked for; doubles cannot show a smaller error.
 LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-15, 0.1
 # Eigenvalues of a symmetric 3x3 matrix are computed to a few u of the largest one.
 EIGENVALUE_SLACK = 16.0 * EPSILON
@@ -88,8 +88,10 @@ def _tensor(value: object) -> Matrix:
 
 
 def triangle_problem(moments: Vector) -> str:
-    """Returns why no rigid body has these three moments of inertia (any unit), or "" if one may.
+    """Returns why no rigid body has these three moments of inertia, or "" if one may have them.
 
+    moments : about three perpendicular axes, in any unit, each >= 0
+    Equality within TRIANGLE_SLACK is accepted.
     Source: [CV] eqs. (3-5): the squares of the sample points' distances must not be negative.
     """
     small, middle, large = sorted(moments)
@@ -100,7 +102,12 @@ def triangle_problem(moments: Vector) -> str:
 
 
 def tensor_problem(tensor: NDArray[np.float64]) -> str:
-    """Returns why no rigid body has this inertia tensor, (3, 3) [kg m2], symmetric, or "" if one may."""
+    """Returns why no rigid body has this inertia tensor, or "" if one may have it.
+
+    tensor : (3, 3) [kg m2], symmetric, finite
+    Principal moments must not be negative and must obey the triangle inequality, both within EIGENVALUE_SLACK
+    of the largest.
+    """
     moments: list[float] = np.linalg.eigvalsh(
         tensor
     ).tolist()  # sums beyond all floats are inf without a warning
@@ -130,7 +137,7 @@ def _direction(value: Any) -> Vector:
 
 
 def _course(value: object) -> tuple[tuple[float, float | bool], ...]:
-    """Returns how an input moves: rows of time [s] and value; two at one time are a jump."""
+    """Returns how an input moves: rows of time [s] and value; two rows at one time are a jump."""
     where = f" = {quantity(value)}: must be "
     if not (isinstance(value, list | tuple) and value and all(map(_is_row, value))):
         raise ValueError(where + "rows [time in s, value] of finite numbers, at least one")

@@ -11,7 +11,12 @@ ROWS = tuple((i, j) for i in (1, 2, 3) for j in (1, 2, 3))
 
 @dataclass(frozen=True)
 class Magnitudes:
-    """Of the whole at the start: mass [kg], mean moment [kg m2], angular velocity [rad/s], 1 at rest."""
+    """Magnitudes of the assembly at the start, of which nominals are made.
+
+    mass   : [kg]
+    moment : mean of the three moments of inertia [kg m2]
+    rate   : length of the angular velocity [rad/s], 1 at rest
+    """
 
     mass: float
     moment: float
@@ -22,15 +27,15 @@ class Magnitudes:
 class OutputKind:
     """A kind of output.
 
-    name        : of the output; that of a vessel is written "vessel.name"
+    name        : name of the output; an output of a vessel is written "vessel.name" in a scene
     unit        : as FMI writes it, "" for a pure number
-    description : of its variables, {vessel} is filled in
-    labels      : of its elements, which carry an index from 1; none for a scalar
-    of_vessel   : whether it is of a vessel, else of the whole
-    matrix      : whether it is a (3, 3) matrix, row by row, with two indices
-    axes        : whether it shows principal moments or axes, which are found only where somebody asks
-    of_step     : whether it follows from a communication step, so that the twin, which takes none, has it not
-    nominal     : its magnitude by those of the whole, for an importer's solver
+    description : text of its variables with a place for {vessel}
+    labels      : of its elements, whose variables carry an index from 1; none for a scalar
+    of_vessel   : whether it is an output of a vessel, else of the assembly
+    matrix      : whether it is a (3, 3) matrix, row by row, whose variables carry two indices
+    axes        : whether it shows principal moments or axes, which are computed only for such outputs
+    of_step     : whether it is a result of a communication step; the twin, which takes none, leaves it out
+    nominal     : magnitudes of the assembly -> its magnitude, for an importer's solver
     """
 
     name: str
@@ -44,7 +49,10 @@ class OutputKind:
     nominal: Callable[[Magnitudes], float] = lambda whole: 1.0
 
     def elements(self, group: str) -> list[tuple[str, str]]:
-        """Returns name and label of each variable of an output; group: its name, with its vessel's."""
+        """Returns name and label of each variable of an output.
+
+        group : the output's name as the scene lists it, "vessel.name" for one of a vessel
+        """
         if self.matrix:
             return [(f"{group}[{i},{j}]", f"{AXES[i - 1]}{AXES[j - 1]}") for i, j in ROWS]
         return [(f"{group}[{i}]", label) for i, label in enumerate(self.labels, start=1)] or [(group, "")]
@@ -149,11 +157,14 @@ VESSEL_OUTPUTS: dict[str, OutputKind] = {
         ),
     )
 }
-"""Outputs of a vessel, by name, written "vessel.name" in a scene; all zero while it is not docked to the
-root's part."""
+"""Outputs of a vessel, by name, written "vessel.name" in a scene. All are zero while docks do not join the
+vessel to the root."""
 
 
 def output_kind(group: str) -> tuple[OutputKind, str]:
-    """Returns kind and vessel, "" for the whole, of an output that a scene lists. Raises KeyError."""
+    """Returns kind and vessel of an output that a scene lists; the vessel is "" for one of the assembly.
+
+    Raises KeyError for an unknown name.
+    """
     vessel, dot, name = group.rpartition(".")
     return (VESSEL_OUTPUTS if dot else OUTPUTS)[name], vessel

@@ -1,4 +1,4 @@
-"""What follows from a scene alone and is asked for again and again."""
+"""Results that depend on a scene alone, kept for the scene that was used last."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -9,9 +9,10 @@ Result = TypeVar("Result")
 
 
 def reused(function: Callable[[Given], Result]) -> Callable[[Given], Result]:
-    """Returns the function with its latest result at hand: for the same argument it is not made again.
+    """Returns a function that keeps its latest result and returns it again for the same argument.
 
-    The same is the very same object. Neither it nor the result, which all callers share, may change.
+    The same argument is the same object, not an equal one. Neither argument nor result may be changed: all
+    callers share them.
     """
     kept: list[tuple[Given, Result]] = []
 

@@ -1,7 +1,7 @@
-"""The scene: vessels with their masses and ports, how they are docked, what may change, how it turns.
+"""The tables of a scene file: vessels with masses and ports, docks, inputs, rotation, experiment, outputs.
 
-Every number is in SI units. The classes hold what a scene file says, checked one table at a time;
-`supervessel.loading` reads files and checks what the tables say of each other.
+Every number is in SI units. Each class is a table and checks its own values; `supervessel.loading` reads
+files and checks the tables against each other.
 """
 
 from collections.abc import Mapping
@@ -39,7 +39,7 @@ PERPENDICULAR_LIMIT = 1e-3
 """Departure [rad] of alignment from the plane across direction that a scene file may have."""
 
 MOST_STEPS = 1_000_000
-"""Communication steps that are flown: each input that moves takes eight bytes of each."""
+"""Most communication steps of an experiment: each moving input takes eight bytes a step."""
 
 
 class Table(BaseModel):
@@ -141,12 +141,13 @@ class Inputs(Table):
     """What may change while the scene runs; everything else is a constant.
 
     mass, pmi     : vessels
-    pose          : docked ports
-    motion        : those of them whose velocity and rate are inputs too
+    pose          : docked ports, "vessel.port"
+    motion        : ports listed in `pose` whose velocity and rate are inputs too
     docked        : docks, by name
-    torque        : about the barycentre
+    torque        : whether there is a torque about the barycentre
     force         : points, "vessel.point"
     vessel_torque : vessels
+    range         : lowest and highest value by an input's name, with or without index, in the input's unit
     """
 
     mass: Names = ()
@@ -163,8 +164,14 @@ class Inputs(Table):
 class Rotation(Table):
     """The rotation law, how it is propagated, what changes keep, and the state at the start.
 
-    mass_change, pose_change : what a change of masses and moments, of poses keeps: the angular velocity or
-                               the angular momentum; see `Scene.keeps` for the default of pose_change
+    law              : see model/docs/equations.md, "Rotation: the four laws"
+    propagator       : see model/docs/scene.md, "Propagators"
+    tolerance        : of a controlled error over a communication step: attitude [rad], rate relative
+    max_angle_step   : largest angle that the body turns in a sub-step of rk4 [rad]
+    mass_change      : what a change of masses or moments keeps, the angular velocity or the angular momentum
+    pose_change      : what a change of poses keeps; see `Scene.keeps` for the default
+    angular_velocity : at the start, (3,) [rad/s], body axes
+    attitude         : q_inertial_body at the start, (w, x, y, z), normalised when read
     """
 
     law: Annotated[Law, _one_of(*get_args(Law))] = "tensor"
@@ -180,9 +187,9 @@ class Rotation(Table):
 class Experiment(Table):
     """The default experiment: duration [s], communication step [s]; what `supervessel trade` flies.
 
-    inputs : rows of time [s] and value by an input's name; linear between them, held before the first and
-             after the last, jumping where two have the same time; a dock's values are true and false. Others
-             keep the scene's values.
+    inputs : by the name of an input, rows of time [s] and value. Between rows the value is linear, before the
+             first and after the last row it is held, and where two rows have the same time it jumps; a dock's
+             values are true and false. Inputs that are not named keep the scene's values.
     """
 
     duration: Seconds
@@ -191,11 +198,12 @@ class Experiment(Table):
 
 
 class Accuracy(Table):
-    """How exact the motion shall be: law, propagator and its setting are then chosen.
+    """How exact the motion shall be; law, propagator and its setting are then chosen.
 
-    attitude, rate : largest error [rad], [rad/s]; rate None: any
-    horizon        : from the start until when [s]
-    step           : communication step [s]
+    attitude : largest error of the attitude [rad]
+    rate     : largest error of the angular velocity [rad/s]; None: any
+    horizon  : time from the start until which they hold [s]
+    step     : communication step [s]
     """
 
     attitude: AttitudeError

@@ -32,8 +32,8 @@ def placed_values(values: Mapping[str, ArrayLike], inputs: Sequence[InputVariabl
     """Returns values by their places among inputs.
 
     values : by name, with or without index, a number or as many numbers as the name has elements
-    Raises ValueError for an unknown name, a wrong count, and a number that is not finite or that the input can
-    never have.
+    Raises ValueError for an unknown name, a wrong count, and a number that is not finite or that the input
+    can never have.
     """
     placed: dict[int, float] = {}
     for name, value in values.items():
