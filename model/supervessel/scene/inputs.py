@@ -1,5 +1,4 @@
-"""The kinds of inputs that a scene may list, one row each. All code that names, checks or uses inputs reads
-these rows.
+"""The kinds of inputs that a scene may list, one row each, which all code about inputs reads.
 
 A new kind needs its row here, its key in `schema.Inputs`, and its equation: in `composite.bodies` if it
 shapes the composite, in `composite.actions` if it acts.
@@ -13,7 +12,7 @@ if TYPE_CHECKING:
     from supervessel.scene.schema import Scene
 
 Part = Literal["shape", "contact", "action"]
-"""Use of an input: it shapes the composite, is the motion with which a part docks, or is a torque or force."""
+"""Use of an input: it shapes the composite, is the motion with which a part docks, or acts on the body."""
 
 Change = Literal["mass", "pose", "docked", ""]
 """What changes with an input: masses and moments; poses and motion of ports; docks; "": none of these."""

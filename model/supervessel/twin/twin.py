@@ -45,9 +45,13 @@ FUNCTIONS = (
 
 @dataclass(frozen=True)
 class Scales:
-    """Magnitudes that make a problem's numbers about 1: divide by them.
+    """Magnitudes by which the numbers of a problem are divided to be about 1.
 
-    x : (7,), u : (m,) [N m], p : (n,), e : (6,), the error state; h : [s]
+    x : (7,), of attitude and angular velocity [rad/s]
+    u : (m,), of torques [N m]; the same numbers stand for forces [N]
+    p : (n,), each in the unit of its input
+    e : (6,), of the error state [rad, rad/s]
+    h : [s]
     """
 
     x: NDArray[np.float64]
@@ -106,12 +110,14 @@ class Twin(Plant):
 
     @cached_property
     def error(self) -> TwinFunction:
-        """x, x_ref -> e, (6,): attitude's error and difference of the rates, about a reference.
+        """x, x_ref -> e, (6,) [rad, rad/s], body axes: error of the attitude, then of the angular velocity.
 
-        The attitude's error, (3,) [rad], is that of q_ref* q in body axes, by `error_form`: "rotvec" the
-        rotation vector, "mrp" 4 times the modified Rodrigues parameters, "vec" 2 times the vector part; all
-        the same to first order. q and -q give the same error, so that no controller unwinds; value,
-        gradient and Hessian are finite everywhere. As a cost's residual it makes Gauss-Newton one line.
+        x and x_ref are states, (7,), each in its own body axes. The attitude's error, (3,), is of
+        q_reference_body = q_ref* q by `error_form`: "rotvec" the rotation vector, "mrp" 4 times the modified
+        Rodrigues parameters, "vec" 2 times the vector part; all the same to first order. The error of the
+        angular velocity is omega - omega_ref, component by component. q and -q give the same error, so a
+        controller takes the shorter way; value, gradient and Hessian are finite everywhere. Used as the
+        residual of a least-squares cost it is all that a Gauss-Newton method needs.
 
         Example:
             >>> twin.error([-0.8, 0, 0, -0.6, 0, 0, 0.5], [1, 0, 0, 0, 0, 0, 0])
@@ -123,9 +129,9 @@ class Twin(Plant):
 
     @cached_property
     def retract(self) -> TwinFunction:
-        """x_ref, e -> x, (7,): the state that has the error e about x_ref, the inverse of `error`.
+        """x_ref, e -> x, (7,): the state that has the error e about x_ref; the inverse of `error`.
 
-        NaN for "vec" where the attitude's error is longer than 2.
+        x_ref : (7,), e : (6,) [rad, rad/s]. x is NaN for "vec" where the attitude's error is longer than 2.
 
         Example:
             >>> x = twin.retract(twin.x_start, [0.1, 0, 0, 0, 0, 1e-3])
@@ -138,9 +144,9 @@ class Twin(Plant):
 
     @cached_property
     def error_ode(self) -> TwinFunction:
-        """e, u, p, x_ref, acceleration_ref -> e_dot, (6,), about a reference that moves on its own.
+        """e, u, p, x_ref, acceleration_ref -> e_dot, (6,) [rad/s, rad/s2], about a reference in motion.
 
-        acceleration_ref : (3,) [rad/s2], how the reference's rate changes; left out it is zero
+        acceleration_ref : (3,) [rad/s2], rate of the components of omega_ref; left out it is zero
 
         Example:
             >>> twin.error_ode(e=[0.1, 0, 0, 0, 0, 0], x_ref=[1, 0, 0, 0, 0, 0, 0.5])["e_dot"][:3]
@@ -157,8 +163,9 @@ class Twin(Plant):
     def linearise(self) -> TwinFunction:
         """x, u, p -> A (6, 6), B (6, m), E (6, n): e_dot = A e + B du + E dp about x, u, p.
 
-        Of the error state, so that a Riccati equation has a solution; the seven numbers of x have one
-        direction that nothing controls. The same for each form of the error.
+        e is the error state, (6,) [rad, rad/s], to first order the same for each form of the error. A model
+        of the seven numbers of x has an uncontrollable direction, the length of the attitude; this one has
+        not, so that a Riccati equation has a solution.
 
         Example:
             >>> A, B, E = twin.linearise(twin.x_start, [0, 0, 0], twin.p_start)
@@ -173,8 +180,8 @@ class Twin(Plant):
     def discretise(self) -> TwinFunction:
         """x, u, p, h -> A (6, 6), B (6, m), E (6, n): e_next = A e + B du + E dp over one `step` from x.
 
-        The derivative of `step` itself, not the exponential of `linearise`: right about any trajectory, and
-        the error is that of the propagator. u and p are held over the step.
+        These are derivatives of `step` itself, not the exponential of `linearise`: they hold about any
+        trajectory, as exactly as the propagator steps. u and p are held over the step of h [s].
 
         Example:
             >>> A, B, E = twin.discretise(twin.x_start, [0, 0, 0], twin.p_start, 0.1)
@@ -186,9 +193,10 @@ class Twin(Plant):
 
     @cached_property
     def trim(self) -> TwinFunction:
-        """x, p -> u, the torque that holds the rate of x steady: a relative equilibrium; no forces.
+        """x, p -> u, (m,), whose torque keeps the angular velocity of x constant; its forces are zero.
 
-        omega x J omega, zero for spins about `principal` axes; with J omega + h where ports move.
+        The torque is omega x (J omega + h), (3,) [N m], body axes, h the momentum of moving ports: a relative
+        equilibrium. Without h it is zero for spins about `principal` axes.
 
         Example:
             >>> u = twin.trim(twin.x_start, twin.p_start)
@@ -203,10 +211,11 @@ class Twin(Plant):
 
     @cached_property
     def principal(self) -> TwinFunction:
-        """p -> moments (3,) [kg m2], ascending, and axes (3, 3), R_body_principal, of what the law turns.
+        """p -> moments (3,) [kg m2], ascending, and axes (3, 3), R_body_principal, of the law's tensor.
 
-        A spin about a column of axes needs no torque: about the first and last it is stable, about the
-        middle one it is not.
+        The law's tensor is J for "tensor", its diagonal for "principal", the unit tensor for the others. A
+        spin about a column of axes needs no torque: about the first and last it is stable, about the middle
+        one it is not.
 
         Example:
             >>> moments, axes = twin.principal(twin.p_start)
@@ -221,8 +230,8 @@ class Twin(Plant):
     def invariants(self) -> TwinFunction:
         """x, p -> kinetic_energy [J], angular_momentum (3,) [N m s], inertial axes: constant without torque.
 
-        Of the tensor that the law turns: J for "tensor", its diagonal for "principal"; "decoupled" and "none"
-        keep the rate itself, and a unit tensor stands for J.
+        Both are formed with the law's tensor, as in `principal`: "decoupled" and "none" keep the angular
+        velocity itself, and the unit tensor stands for J.
 
         Example:
             >>> round(float(twin.invariants(twin.x_start, twin.p_start)[0]), 3)
@@ -269,13 +278,13 @@ class Twin(Plant):
 
     @cached_property
     def _spin(self) -> ca.SX:
-        """Angular momentum, (3,), of what moves relative to the body axes, as far as the law knows it."""
+        """h, (3,) [N m s], body axes, of moving parts; zero where the law has no gyroscopic term."""
         known = "momentum" in self._model.slices.composite and LAWS[self.scene.rotation.law].gyroscopic_term
         return self._c[self._model.slices.composite["momentum"]][:3] if known else ca.SX.zeros(3)
 
     @cached_property
     def _turning(self) -> ca.SX:
-        """The tensor, (3, 3), whose free motion the law describes."""
+        """The tensor, (3, 3) [kg m2], body axes, whose free motion is the law's: `RotationLaw.turning`."""
         inertia = from_upper_triangle(self._c[composite_slices()["inertia"]])
         return LAWS[self.scene.rotation.law].turning(inertia)
 
@@ -288,11 +297,12 @@ class Twin(Plant):
     ) -> dict[str, ca.Function]:
         """Returns functions by name, compiled to machine code and loaded back as `ca.external`.
 
-        folder      : where C and library go, made if need be; what is there already is not compiled again
-        functions   : names of this twin's, or functions themselves, `twin.rollout(20)` or any other of CasADi
-        derivatives : of what order derivatives are compiled too: 0, 1, or 2 for exact Hessians
-        The numbers are those of the originals to the last bit where only + - * / and the square root occur.
-        Raises ValueError for names that are none, BuildError if the compiler of package fmu_build fails.
+        folder      : of the C file and the library, made if need be; unchanged C is not compiled again
+        functions   : names of functions of this twin, or CasADi functions such as `twin.rollout(20)`
+        derivatives : highest order of the derivatives that are compiled too: 0, 1, or 2 for exact Hessians
+        The compiled functions return the same numbers to the last bit where only + - * / and the square root
+        occur.
+        Raises ValueError for an unknown name, BuildError if the compiler of package fmu_build fails.
 
         Example:
             >>> step = twin.generate("build/twin", ["step"], derivatives=0)["step"]
@@ -312,15 +322,16 @@ class Twin(Plant):
     def communication_step(self, folder: str | PathLike[str], sub_steps: int = 1) -> TwinFunction:
         """Returns the function x, u, p, h -> x_next of a whole communication step, by the FMU's own C.
 
-        Sub-steps, control of the error and the choice that "auto" makes are the FMU's, to the last bit, as of
-        an FMU that is started at x under p. (Free motion over several steps is counted from where it began;
-        a later step then differs in the last bits.) What the FMU refuses raises RuntimeError, with the reason
-        on stderr: h <= 0, a torque for "exact", inputs that make no rigid body, too many sub-steps. It is
-        compiled already: `generate` takes nothing that calls it.
+        The step is that of an FMU started at x under p, to the last bit: its sub-steps, its control of the
+        error, its choice under "auto". (An FMU counts free motion over several steps from its beginning; a
+        later step then differs in the last bits.) Where the FMU refuses a step, the call raises RuntimeError
+        and writes the reason to stderr: h <= 0, a torque for "exact", inputs that make no rigid body, too
+        many sub-steps. The function is compiled: `generate` refuses functions that call it.
 
-        folder    : where the library goes, made if need be; what is there already is not compiled again
-        sub_steps : the derivatives, of any order, are those of so many equal steps of `step`: to rounding the
-                    value's own where the FMU takes these sub-steps, else as accurate as such steps are
+        folder    : of the library, made if need be; an unchanged library is not compiled again
+        sub_steps : number of equal steps of `step` whose derivatives, of any order, the function has. They
+                    are derivatives of the value itself, to rounding, where the FMU takes the same sub-steps;
+                    else they are as accurate as steps of that size
         Raises ValueError for a count below 1, BuildError if the compiler of package fmu_build fails.
 
         Example:
