@@ -25,7 +25,7 @@ class Body:
     centre    : (3,) [m], its centre of mass
     inertia   : (3, 3) [kg m2], about the centre of mass
     velocity  : (3,) [m/s], of the centre, relative to the axes; None: at rest in them, and so is all of it
-    spin      : (3,) [N m s], angular momentum about the centre of what moves relative to the axes, or None
+    spin      : (3,) [N m s], angular momentum of the motion relative to the axes, about the centre; or None
     """
 
     mass: ca.SX

@@ -1,7 +1,10 @@
 """The kinds of inputs that a scene may list, one row each: whatever names, checks or uses inputs reads them.
 
-A new kind is its row here, its key in `schema.Inputs`, and the place that gives its equation: for what shapes
-the composite `composite.bodies`, for what acts `composite.actions`.
+A new kind whose effect follows from inputs alone is its row here, its key in `schema.Inputs`, and the place
+that gives its equation: for what shapes the composite `composite.bodies`, for a torque or a force
+`composite.actions`. A torque that depends on attitude or rate besides needs `rotation.dynamics` (its rate of
+change), `rotation.steps` (how fast it grows), `twin.linear` and `twin.plant` (its derivatives, trim), and a
+word in the `suits` of propagators that cannot have it.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -33,7 +36,8 @@ class InputKind:
     key         : of `[inputs]`, which lists the owners
     quantity    : last part of the variables' names
     owner       : what the list names
-    elements    : 3 for a vector, whose variables carry an index from 1; 0 for a scalar
+    elements    : 3 for a vector, whose variables carry an index from 1, as every input that acts is; 0 for a
+                  scalar
     unit        : as FMI writes it, "" for a pure number
     part        : of the equations that it belongs to
     change      : which kind of change its change is

@@ -9,8 +9,8 @@ def linear_model(state: ca.SX, torque: ca.SX, p: ca.SX, acceleration: ca.SX) -> 
     """Returns A (6, 6), B (6, m), E (6, n): rate of a small error by the error, the torque, the inputs p.
 
     acceleration : (3,) [rad/s2], expression of state (7,), torque (m,) and p (n,)
-    The attitude's error phi has the rate (change of omega) - omega x phi; its own columns of A in the rows
-    of the rate are zero, as no law knows the attitude.
+    The error is (phi, d_omega): phi' = d_omega - omega x phi. The block of A from phi to d_omega' is zero: no
+    torque here depends on the attitude.
     """
     omega = state[4:]
     A = ca.blockcat([[-ca.skew(omega), ca.SX.eye(3)], [ca.SX(3, 3), ca.jacobian(acceleration, state)[:, 4:]]])
@@ -23,7 +23,7 @@ def discrete_model(state: ca.SX, torque: ca.SX, p: ca.SX, end: ca.SX) -> tuple[c
     """Returns A (6, 6), B (6, m), E (6, n): a small error at a step's end by that at its start, torque, p.
 
     end : (7,), the state after the step, expression of state (7,), torque (m,) and p (n,)
-    The tangent at the end, four times its transpose, takes a small change of attitude to its error.
+    The error is (phi, d_omega). With T(q) = `tangent(q)`, dq = T phi and phi = 4 T^T dq.
     """
     begun = ca.diagcat(tangent(state[:4]), ca.SX.eye(3))
     ended = ca.diagcat(4.0 * tangent(end[:4]).T, ca.SX.eye(3))
