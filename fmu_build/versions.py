@@ -38,8 +38,8 @@ VERSIONS: dict[int, Version] = {
         icon="model.png",
         terminals="3.0",
         platform_tuples=False,
-        refusal="The answer is Discard where FMI 2.0 allows it (a step; in model exchange a get and the "
-        "derivatives too), else Error.",
+        refusal="The answer is Discard where FMI 2.0 allows it (a set, a step; in model exchange a get and "
+        "the derivatives too), else Error.",
     ),
     3: Version(
         "3.0",

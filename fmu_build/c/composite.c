@@ -1,5 +1,6 @@
-/* The composite that follows from the inputs: judges each, computes mass, barycentre and inertia, judges these
-   together.
+/* The composite that follows from the inputs, and whether their values can be used: judges each, computes mass,
+   barycentre and inertia, judges these together. A value that cannot be used is refused here (instance_refuse: Discard,
+   or Error where FMI 2.0 has it so).
 
    Owns composite_is_current, composite_is_ordinary, axes_are_current and a of Dynamics, and the candidate in scratch; p
    and c become current by changes_apply. Needs of the model: composite, axes. */

@@ -87,8 +87,9 @@ typedef void (*LogWriter)(const Instance *instance, Status status, const char *c
    early, at *end [s] or as soon as possible after it. */
 typedef bool (*SubStepListener)(Instance *instance, double *end);
 
-/* How a step goes on that is counted from an epoch: by free_motion, as the first one did, or by free_at. The first of
-   them finds out which; an epoch that no step goes on from, as where torque acts again, costs nothing more. */
+/* How steps after the first one are computed that are counted from the same epoch: by free_motion, as the first one
+   was (EPOCH_DOUBLED), or by free_at, from theta functions (EPOCH_SERVED). The second step decides (EPOCH_NEW until
+   then): a free step that stands alone costs nothing more. */
 typedef enum { EPOCH_NEW, EPOCH_SERVED, EPOCH_DOUBLED } EpochStep;
 
 /* All that a saved state holds. The doubles come first: there is no padding but at the end, and that stays zero. Arrays

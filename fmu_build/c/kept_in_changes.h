@@ -5,8 +5,8 @@
 
 #include "changes.h"
 
-/* Takes the angular velocity from what was committed to that before docks close, after all else has changed to p, whose
-   composite is c. */
+/* Gives the angular velocity after docks have opened and masses and poses have changed, and before docks close; p are
+   the new inputs, c their composite. */
 Status rate_on_the_way(Instance *instance, const double p[], const double c[], double rate[3]);
 
 /* Inputs on the way of a change, and their composite once it is asked for. */

@@ -8,7 +8,8 @@ void changes_mirror(Instance *instance) {
     (void)instance;
 }
 
-/* In continuous time a change that keeps momentum beside others that keep the rate would need the inputs' rates. */
+/* Where masses keep the rate and poses the momentum, or the other way round, a change in continuous time would need
+   the inputs' own rates, which FMI does not give. */
 Status exchange_check_continuous(Instance *instance, const double p[]) {
     const unsigned keeping = (MASSES_KEEP_MOMENTUM ? KIND_MASS : 0) | (POSES_KEEP_MOMENTUM ? KIND_POSE : 0);
     for (size_t i = 0; i < INPUT_P_COUNT; i++) {

@@ -19,8 +19,8 @@ typedef struct {
 
     /* where series are followed */
     double acceleration[3]; /* rad/s2, by the torque */
-    double rest[3];         /* rad/s, what rounding has kept from the angular velocity */
-    double drift;           /* rad, what other rounding of the angular velocity comes to at the step's end; in error */
+    double rest[3];         /* rad/s, what the angular velocity lacks by rounding: carried on (compensated sum) */
+    double drift;           /* rad, by other rounding of the angular velocity, at the step's end; part of error */
 } Progress;
 
 /* Advances the state from time [s] by one communication step of size h [s], or to where the importer wants it to end

@@ -19,7 +19,7 @@ Status instance_unknown_reference(Instance *instance, unsigned reference) {
     return instance_error(instance, "value reference %u is unknown; the largest is %d", reference, VARIABLE_COUNT - 1);
 }
 
-static Status refuse_boolean(Instance *instance, unsigned reference) {
+static Status error_boolean(Instance *instance, unsigned reference) {
     return instance_error(instance, "%s is a Boolean, not a number", VARIABLES[reference].name);
 }
 
@@ -108,7 +108,7 @@ Status instance_get(Instance *instance, const unsigned references[], size_t coun
     unsigned wanted = 0;
     for (size_t i = 0; i < count; i++) {
         if (references[i] >= VARIABLE_COUNT) return instance_unknown_reference(instance, references[i]);
-        if (is_boolean(references[i])) return refuse_boolean(instance, references[i]);
+        if (is_boolean(references[i])) return error_boolean(instance, references[i]);
         wanted |= follows(instance, references[i]);
     }
     const Status status = prepare(instance, wanted);
@@ -151,7 +151,7 @@ static bool is_input(unsigned reference) {
 /* Whether a value may be stored: known, settable in this state, finite. */
 static Status check_set(Instance *instance, unsigned reference, double value) {
     if (reference >= VARIABLE_COUNT) return instance_unknown_reference(instance, reference);
-    if (is_boolean(reference)) return refuse_boolean(instance, reference);
+    if (is_boolean(reference)) return error_boolean(instance, reference);
     const Variable *variable = &VARIABLES[reference];
     if (variable->role != ROLE_INPUT) {
         const Status status = check_settable(instance, variable);

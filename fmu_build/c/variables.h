@@ -13,7 +13,7 @@ Status instance_set(Instance *instance, const unsigned references[], size_t coun
 /* Whether references are of the table. */
 Status instance_check_references(Instance *instance, const unsigned references[], size_t count);
 
-/* Refuses a reference that is not. */
+/* Logs an error for a reference that is not. */
 Status instance_unknown_reference(Instance *instance, unsigned reference);
 
 static inline bool is_boolean(unsigned reference) {

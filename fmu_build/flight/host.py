@@ -1,6 +1,6 @@
 """Flies an FMU's library in a process of its own: python host.py JOB.json, the result on stdout as JSON.
 
-Started by `flight.py`, with nothing of this package: whatever a library does, the trade goes on.
+Started by `flying.py`, with nothing of this package: whatever a library does, the trade goes on.
 """
 
 import ctypes
@@ -62,7 +62,7 @@ class Report(ctypes.Structure):
 
 
 def fly(job: dict[str, Any]) -> list[dict[str, Any]]:
-    """Returns what came of a job's courses, as `flight.py` lays them out, up to the first that is refused.
+    """Returns what came of a job's courses, as `flying.py` lays them out, up to the first that is refused.
 
     Samples go into a file, a course's after those of the one before. A job may ask to judge rows of inputs
     instead: a byte each, 1 where an instance can start with them.

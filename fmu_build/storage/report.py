@@ -31,7 +31,7 @@ NAME = re.compile(r"supervessel-\d+")
 """Of a cache, of whatever layout."""
 
 GOING = ".supervessel-going-"
-"""How the name of a cache begins that is being removed."""
+"""Beginning of the name of a cache while it is being removed."""
 
 
 def cache(options: argparse.Namespace) -> int:

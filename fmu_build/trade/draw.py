@@ -1,8 +1,8 @@
 """Draws a work-precision plot in a process of its own: python draw.py FOLDER.
 
-Started by `plotting.py`, with nothing of this package, in an empty folder and empty surroundings, since
-matplotlib reads its settings wherever it finds them. FOLDER/figure.json is what is drawn; plot.svg and
-plot.png appear beside it.
+Started by `plotting.py`, with nothing of this package, in an empty folder and without the user's environment
+variables, since matplotlib reads its settings wherever it finds them. FOLDER/figure.json is what is drawn;
+plot.svg and plot.png appear beside it.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""The trade: references, errors apart, what is the same taken together, and the Pareto front."""
+"""The trade: every choice flown against a reference, models of the same motion merged, the Pareto front."""
 
 import json
 import platform
@@ -42,7 +42,7 @@ ABOUT = {
     "experiment": "flown: duration [s], communication step [s], inputs as rows of time [s] and value",
     "steps": "communication steps of the experiment",
     "horizons": "times [s] up to which errors in lists are the largest; single errors are over the whole",
-    "doubt": "how far two ways to the best model's motion are apart: smaller errors are not told",
+    "doubt": "how far two ways to the best model's motion are apart: smaller errors cannot be told",
     "models": "laws, and what each leaves out: its exact motion against the best model's, the last one",
     "choices": "models with a propagator and its settings: errors and costs",
     "refused": "choices that could not be flown",
@@ -221,7 +221,7 @@ def _same(tried: Sequence[Model], references: dict[Model, _Reference]) -> dict[M
 
 
 def _ladders(scene: Scene, kept: Sequence[Model], count: _Count, *, quick: bool) -> dict[Choice, Flown]:
-    """Returns what came of the models' choices; coarser steps of rk4 where the finest divides any."""
+    """Returns what came of the models' choices; coarser steps of rk4 only where the finest took sub-steps."""
     steps = course_of(scene).steps
     finest = [by_angle(model, quick=quick)[0] for model in kept]
     others = [choice for model in kept for choice in by_tolerance(scene, model, quick=quick)]

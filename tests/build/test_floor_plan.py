@@ -18,6 +18,7 @@ from fmu_build.flight.experiment import acts
 from fmu_build.interface.terminals import terminals
 from fmu_build.interface.variable_table import variable_table
 from supervessel import SceneError, Twin, output_expressions, parse_scene
+from supervessel.composite.actions import equation_of
 from supervessel.equations import equations
 from supervessel.scene import inputs, outputs, schema
 from support import OK, Instance, body, variant
@@ -136,6 +137,12 @@ def test_a_new_kind_of_input_and_an_output_are_on_the_page_and_among_the_termina
     assert "square of the rate" in html
     (terminal,) = (one for one in terminals(scene, entries) if one.name == "drag")
     assert [entry.variable.name for entry in terminal.members] == ["drag[1]", "drag[2]", "drag[3]"]
+
+
+def test_a_new_kind_that_is_no_torque_needs_an_equation():
+    per_second = replace(inputs.TORQUE, key="gradient", unit="1/s")
+    with pytest.raises(KeyError, match=r"no equation for inputs\.gradient"):
+        equation_of(per_second)
 
 
 @pytest.mark.usefixtures("new_kinds")

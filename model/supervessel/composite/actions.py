@@ -14,7 +14,7 @@ from supervessel.composite.poses import Pose, constant
 from supervessel.composite.resolved import ResolvedScene
 from supervessel.layout import slices_of
 from supervessel.rotation.attitude import quaternion, to_inertial
-from supervessel.scene.inputs import FORCE, vessel_of
+from supervessel.scene.inputs import FORCE, TORQUE, InputKind, vessel_of
 from supervessel.scene.schema import Scene
 from supervessel.scene.variables import InputVariable
 
@@ -50,14 +50,24 @@ def _on_vessel(scene: Scene, name: str, where: Placed, centre: ca.SX) -> Acting:
     return Acting(pose.rotation if attached is None else attached * pose.rotation)
 
 
-ACTIONS: dict[str, Callable[[Scene, str, Placed, ca.SX], Acting]] = {
+Equation = Callable[[Scene, str, Placed, ca.SX], Acting]
+
+ACTIONS: dict[str, Equation] = {
     "force": _at_point,
     "vessel_torque": _on_vessel,
 }
-"""By the key of `[inputs]`: scene, owner, poses of vessels, barycentre -> the matrices of an input that acts.
+"""By key of `[inputs]`: scene, owner, poses of vessels, barycentre -> the matrices of an input that acts."""
 
-An input of another key is itself a torque about the barycentre in body axes.
-"""
+
+def equation_of(kind: InputKind) -> Equation | None:
+    """Returns the equation of an input that acts; None for a torque about the barycentre in body axes.
+
+    None is returned for a kind of the whole assembly, in N m. Raises KeyError for any other kind without an
+    equation.
+    """
+    if kind.key not in ACTIONS and (kind.owner or kind.unit != TORQUE.unit):
+        raise KeyError(f"composite.actions.ACTIONS has no equation for inputs.{kind.key} [{kind.unit}]")
+    return ACTIONS.get(kind.key)
 
 
 def action_parts(resolved: ResolvedScene, lookup: Lookup, centre: ca.SX) -> dict[str, ca.SX]:
@@ -69,11 +79,15 @@ def action_parts(resolved: ResolvedScene, lookup: Lookup, centre: ca.SX) -> dict
                vessel
     "force"  : (9 m,), the matrices `Acting.force`, column by column, of each force
     """
-    acting = [variable for _, variable in _acting(resolved) if variable.kind.key in ACTIONS]
+    acting = [
+        (equation, variable.owner)
+        for _, variable in _acting(resolved)
+        if (equation := equation_of(variable.kind)) is not None
+    ]
     if not acting:
         return {}
-    where = _placed(resolved, lookup, {vessel_of(variable.owner) for variable in acting})
-    found = [ACTIONS[v.kind.key](resolved.scene, v.owner, where, centre) for v in acting]
+    where = _placed(resolved, lookup, {vessel_of(owner) for _, owner in acting})
+    found = [equation(resolved.scene, owner, where, centre) for equation, owner in acting]
     parts = {"moment": ca.vertcat(*(ca.vec(one.moment) for one in found))}
     forces = [ca.vec(one.force) for one in found if one.force is not None]
     if "net_force" in resolved.scene.outputs.names and forces:
@@ -95,7 +109,7 @@ def torque_about_barycentre(resolved: ResolvedScene, parts: Mapping[str, ca.SX],
     total, taken = ca.SX.zeros(3), 0
     for place, variable in _acting(resolved):
         own = u[place : place + 3]
-        if variable.kind.key in ACTIONS:
+        if equation_of(variable.kind) is not None:
             own = _matrix(parts["moment"], taken) @ own
             taken += 1
         total = total + own

@@ -1,7 +1,10 @@
 """The kinds of inputs that a scene may list, one row each, which all code about inputs reads.
 
-A new kind needs its row here, its key in `schema.Inputs`, and its equation: in `composite.bodies` if it
-shapes the composite, in `composite.actions` if it acts.
+A new kind whose effect follows from inputs alone needs its row here, its key in `schema.Inputs`, and its
+equation: in `composite.bodies` if it shapes the composite, in `composite.actions` if it is a torque or a
+force. A torque that depends on attitude or rate besides needs `rotation.dynamics` (its rate of change),
+`rotation.steps` (how fast it grows), `twin.linear` and `twin.plant` (its derivatives, trim), and a word in
+the `suits` of propagators that cannot have it.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -33,7 +36,8 @@ class InputKind:
     key         : key of `[inputs]`, whose list names the owners
     quantity    : last part of the variables' names, `mass` in `DG.mass`
     owner       : what an owner is
-    elements    : 3 for a vector, whose variables carry an index from 1; 0 for a scalar
+    elements    : 3 for a vector, whose variables carry an index from 1, as every input that acts is; 0 for a
+                  scalar
     unit        : as FMI writes it, "" for a pure number
     part        : its use
     change      : what changes with it

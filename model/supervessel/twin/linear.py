@@ -1,6 +1,6 @@
 """Linear models of the error state, in CasADi symbols. They are the same for each form of the error.
 
-e = (phi, d omega), (6,) [rad, rad/s], is a small error of the state in body axes, see `error_state`; du and
+e = (phi, d_omega), (6,) [rad, rad/s], is a small error of the state in body axes, see `error_state`; du and
 dp are small changes of the inputs u that act, (m,), and of the other inputs p, (n,).
 """
 
@@ -16,8 +16,8 @@ def linear_model(state: ca.SX, torque: ca.SX, p: ca.SX, acceleration: ca.SX) -> 
     torque       : u, (m,) [N m, N]
     p            : (n,)
     acceleration : omega', (3,) [rad/s2], body axes, an expression of state, torque and p
-    phi' = d omega - omega x phi: `error_state.error_rate` to first order. d omega' does not depend on phi, as
-    no law depends on the attitude.
+    phi' = d_omega - omega x phi: `error_state.error_rate` to first order. The block of A from phi to d_omega'
+    is zero: no torque here depends on the attitude.
     """
     omega = state[4:]
     A = ca.blockcat([[-ca.skew(omega), ca.SX.eye(3)], [ca.SX(3, 3), ca.jacobian(acceleration, state)[:, 4:]]])
@@ -33,8 +33,8 @@ def discrete_model(state: ca.SX, torque: ca.SX, p: ca.SX, end: ca.SX) -> tuple[c
     torque : u, (m,) [N m, N], held over the step
     p      : (n,), held over the step
     end    : (7,), the state at the end of the step, an expression of state, torque and p
-    With T = `error_state.tangent`, (4, 3), a small error phi changes the attitude by T phi, and 4 T^T takes a
-    small change of a unit attitude back to phi: T^T T is a quarter of the unit matrix.
+    With T(q) = `error_state.tangent`, (4, 3), dq = T phi and phi = 4 T^T dq: for a unit attitude T^T T is a
+    quarter of the unit matrix.
     """
     begun = ca.diagcat(tangent(state[:4]), ca.SX.eye(3))
     ended = ca.diagcat(4.0 * tangent(end[:4]).T, ca.SX.eye(3))
