@@ -36,16 +36,17 @@ void changes_commit(Instance *instance);
 /* Whether what the state of model exchange holds has changed since the last commit. */
 bool changes_moved(const Instance *instance);
 
-/* Where the state of model exchange is the angular momentum: makes x follow from the states in model exchange, the
-   states from x elsewhere, unless they do. */
+/* Where the angular momentum is a state of model exchange, x and the states are two copies of the same motion. Makes x
+   follow from the states in model exchange, and the states from x in co-simulation and before the start. */
 void changes_mirror(Instance *instance);
 
-/* What small changes of the inputs make of the angular velocity, added to v->x: by what the last change kept. Reverse:
-   weights on v->x to weights on the inputs. */
+/* Adds to v->x the change of the angular velocity by small changes of the inputs, as the last change of inputs kept
+   rate or momentum. Reverse: adds to the weights on the inputs those that follow from the weights on v->x. */
 Status changes_forward(Instance *instance, Variation *v);
 Status changes_reverse(Instance *instance, Variation *v);
 
-/* The state's momentum at the start: a change of v->x, of rate, to one of momentum, and weights back. */
+/* At the start, where the angular momentum is a state: turns the change of the angular velocity in v->x into that of
+   the momentum; reverse: turns weights on the momentum into weights on the angular velocity. */
 void changes_start_forward(Instance *instance, Variation *v);
 void changes_start_reverse(Instance *instance, Variation *v);
 

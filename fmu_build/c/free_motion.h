@@ -6,10 +6,11 @@
 
 #include "instance.h"
 
-/* Whether motion without torque from a state over a time [s] turns little enough to be followed. */
+/* Whether motion without torque from a state x[STATE_COUNT] over a time [s] turns the body by at most LARGEST_TURN. */
 bool free_reaches(const double x[], double time);
 
-/* Carries a state on by a time [s] of motion without torque. */
+/* Carries a state x[STATE_COUNT] on by a time [s] of motion without torque, to next[STATE_COUNT]. Refuses a motion
+   that cannot be followed. */
 Status free_motion(Instance *instance, const double x[], double time, double next[]);
 
 /* The state and the free part of a, scaled by powers of two so that rates and moments are about 1; the time then is

@@ -1,5 +1,20 @@
-/* Functions generated from the scene's equations (model.c); see supervessel/equations.py for what they compute.
-   Each reads its arguments through arg, writes its results through res and returns 0. */
+/* Functions generated from the scene's equations (model.c); supervessel/equations.py says what they compute.
+   Each reads its arguments through arg, writes its results through res and returns 0. iw and w are work arrays of
+   WORK_INT and WORK_REAL elements; mem is 0.
+
+   Arguments and results, with their counts; axes are body axes:
+     p [INPUT_P_COUNT]    inputs that shape the composite, directions scaled
+     k [INPUT_K_COUNT]    motion at contact: m/s, rad/s
+     u [INPUT_U_COUNT]    torques, N.m, and forces, N
+     x [STATE_COUNT]      attitude w, x, y, z; angular velocity, rad/s
+     z [STATE_COUNT]      states of model exchange: x, or attitude and angular momentum, N.m.s
+     c, d [COMPOSITE_COUNT]  composites
+     a [AXES_COUNT]       principal moments and axes
+     e                    estimated error of the last communication step, rad
+     y [OUTPUT_COUNT]     outputs
+     omega, momentum [3]  rad/s, N.m.s
+     h, t                 times, s
+   A small change of a quantity has d before its name, a weight on it w. */
 #ifndef MODEL_H
 #define MODEL_H
 

@@ -1,5 +1,14 @@
-/* A communication step of co-simulation, and what its sub-steps have in common. How a sub-step is taken is the
-   method's: the FMU has one file with solver_advance, that of its scene's plan. */
+/* A communication step of co-simulation, and what its sub-steps have in common.
+
+   Where to look for what decides a step (each FMU has only the files that its scene needs):
+     the step as a whole, its times, early return          solver.c
+     free motion or a sub-step of a method: solver_advance  one of every_step.c, exact.c, while_free.c
+     a sub-step and its size: solver_sub_step
+       rk4, size by the angle turned                       rk4.c
+       taylor, size by the estimated error of the series   taylor.c, taylor_series.c
+       dop853, split, size tried and taken again shorter   tried_steps.c with dop853.c or split.c
+       size and growth by an estimated error               estimated_steps.c
+     a step of free motion                                 free_step.c, free_motion.c */
 #ifndef SOLVER_H
 #define SOLVER_H
 

@@ -13,15 +13,15 @@
 
 enum { POSE = LOOP_POSE, PORT = LOOP_PORT, SEEN = LOOP_SEEN, BLOCK = LOOP_BLOCK };
 
-/* What follows from p. Of poses and of bodies seen from the root as many stand side by side as in the tables; the
-   root's own pose is the last of the first ones. */
+/* The quantities of supervessel/composite/chain.py, in its layout. Poses of groups, and bodies in root axes, stand in
+   blocks of BLOCK side by side, as in the tables; the pose of the root's own group is the last of the first block. */
 typedef struct {
     double pose[(LOOP_FRAME_COUNT + 2 * BLOCK - 2) / BLOCK * BLOCK * POSE];
     double seen[LOOP_BODY_COUNT * SEEN], mass[LOOP_BODY_COUNT], first[3];
     double sum[4], middle[3], inertia[6];
 } Chain;
 
-/* Small changes of it, or weights on it. */
+/* Small changes of the quantities of a Chain, or weights on them; bodies and poses one after the other. */
 typedef struct {
     double pose[LOOP_FRAME_COUNT][POSE], seen[LOOP_BODY_COUNT][SEEN];
     double sum[4], middle[3], inertia[6];
@@ -29,7 +29,7 @@ typedef struct {
 
 typedef char WorkHoldsBoth[sizeof(Chain) + sizeof(ChainVariation) <= LOOP_WORK * sizeof(double) ? 1 : -1];
 
-/* Sums are read and written in one place: each element of theirs follows from the same element before. */
+/* A generated step. A sum is argument and result in the same array: each new element depends on no other old one. */
 typedef int Kernel(const double **arg, double **res, int *iw, double *w, int mem);
 
 static Kernel *const SEE_FORWARD[] = {loop_fixed_forward, loop_scaled_forward, loop_free_forward,
@@ -44,7 +44,7 @@ static const size_t HELD_COUNT[] = {SEEN, SEEN, POSE, 3, 0, SEEN, SEEN, POSE};
 
 static const double NOTHING[POSE];
 
-/* What places are in: p and LOOP_HELD. */
+/* The arrays that a LoopPlace points into, by its `held`: p and LOOP_HELD. */
 typedef const double *const Sources[2];
 
 LANES_INLINE const double *value(const Sources from, LoopPlace place) {
@@ -64,7 +64,7 @@ static void add_weights(double wp[], LoopPlace place, const double terms[], size
     if (!place.held) add_to(&wp[place.at], terms, count);
 }
 
-/* Where the pose of a frame stands, and which frame's it is. */
+/* The index in Chain.pose of a frame's pose, and back from that index the frame. */
 static size_t pose_at(size_t frame) {
     const size_t place = frame + BLOCK - 1;
     return place / BLOCK * BLOCK * POSE + place % BLOCK;
@@ -73,19 +73,19 @@ static size_t frame_at(int pose) {
     return (size_t)pose / (BLOCK * POSE) * BLOCK + (size_t)pose % BLOCK - (BLOCK - 1);
 }
 
-/* Where the numbers of a body begin that is seen from the root. */
+/* The index in Chain.seen of a body's first number. */
 static size_t seen_at(size_t body) {
     return body / BLOCK * BLOCK * SEEN + body % BLOCK;
 }
 
-/* Takes numbers of one among those that stand side by side. */
+/* Copies the numbers of one pose or body out of a block, where they stand BLOCK apart. */
 static const double *take(double to[], const double from[], size_t count) {
     for (size_t i = 0; i < count; i++) to[i] = from[i * BLOCK];
     return to;
 }
 
-/* Poses of frames in axes that stand already: of the groups that they hang on; of INSIDE, all of them or none, by the
-   vessel there. */
+/* Poses of LANES frames from those of the groups that they hang on, which are known. inside: whether the frames are of
+   kind FRAME_INSIDE; all of them must be, or none. */
 LANES_INLINE void place_groups(const Sources sources, const Chain *now, const LoopFrame *const f[LANES], bool inside,
                                Lanes placed[POSE]) {
     const double *outer[LANES], *parent_port[LANES], *child_port[LANES], *held[LANES];
@@ -107,7 +107,7 @@ LANES_INLINE void place_groups(const Sources sources, const Chain *now, const Lo
     lanes_then((const Lanes *const[]){pose, inside ? turned : step}, placed);
 }
 
-/* Places a frame that hangs on one so near before it that it must wait for that. */
+/* Places one frame alone, where frames side by side are not of one kind or one of them hangs on another. */
 static void place_one(const Sources sources, Chain *now, size_t frame) {
     const LoopFrame *f[LANES];
     Lanes placed[POSE];

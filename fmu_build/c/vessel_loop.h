@@ -4,12 +4,13 @@
 
 #include "scene.h"
 
-/* Where numbers begin: in p, or in LOOP_HELD, of what the scene holds constant. */
+/* The place where numbers begin: index `at` of p, or, where `held` is 1, of the scene's constants in LOOP_HELD. */
 typedef struct {
     int held, at;
 } LoopPlace;
 
-/* How a group of vessels hangs on the group before it; INSIDE: by a vessel that is not the first of its group. */
+/* How a rigid group of vessels hangs on its parent's group. ROOT: the root's own group, which hangs on nothing. FIRST:
+   the parent vessel's axes are those of its group. INSIDE: they are not. */
 typedef struct {
     enum { FRAME_ROOT, FRAME_FIRST, FRAME_INSIDE } kind;
     int parent;                           /* where that group's pose stands */
@@ -17,7 +18,8 @@ typedef struct {
     LoopPlace parent_port, child_port;    /* position, direction, alignment of each */
 } LoopFrame;
 
-/* A body of a group: several constant vessels, or one whose mass or moments are inputs; OWN: of the root's group. */
+/* A body of a group: the constant vessels of the group as one, or a vessel whose mass or moments are inputs. The kinds
+   are the steps of these names in supervessel/composite/chain.py; OWN: of the root's own group. */
 typedef struct {
     enum {
         BODY_FIXED, BODY_SCALED, BODY_FREE, BODY_DIAGONAL, BODY_DIAGONAL_FREE,
@@ -29,7 +31,8 @@ typedef struct {
     LoopPlace moments;                    /* of ..._FREE */
 } LoopBody;
 
-/* Numbers of bodies and poses stand LOOP_BLOCK side by side: the next one of the same body is LOOP_BLOCK on. */
+/* Bodies and poses stand LOOP_BLOCK side by side: two numbers of the same body that follow each other are LOOP_BLOCK
+   apart. */
 extern const LoopFrame LOOP_FRAMES[];
 extern const LoopBody LOOP_BODIES[];
 extern const double LOOP_HELD[];
