@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import casadi as ca
 
 from fmu_build.generate.change_tables import change_constants
-from fmu_build.generate.vessel_loop import Tables, loop_constants
+from fmu_build.generate.vessel_loop import LoopTables, loop_constants
 from fmu_build.interface.model_description import LOG_CATEGORIES
 from fmu_build.interface.variable_table import TableEntry
 from supervessel.equations import Equations
@@ -25,7 +25,7 @@ def scene_header(
     model: Equations,
     entries: Sequence[TableEntry],
     functions: Iterable[ca.Function],
-    loop: Tables | None,
+    loop: LoopTables | None,
 ) -> str:
     """Returns scene.h.
 
@@ -114,7 +114,7 @@ def _rules(scene: Scene) -> dict[str, int]:
     }
 
 
-def _work_arrays(functions: Iterable[ca.Function], loop: Tables | None) -> dict[str, int]:
+def _work_arrays(functions: Iterable[ca.Function], loop: LoopTables | None) -> dict[str, int]:
     """Returns sizes of the work arrays, each enough for any of the functions; no array of C is empty."""
     sizes = [(f.sz_arg(), f.sz_res(), f.sz_iw(), f.sz_w()) for f in functions]
     arguments, results, integers, reals = (max(1, *column) for column in zip(*sizes, strict=True))

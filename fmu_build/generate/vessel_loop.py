@@ -29,7 +29,7 @@ NOWHERE = "{1, 0}"
 
 
 @dataclass(frozen=True)
-class Row:
+class BodyRow:
     """A row of LOOP_BODIES.
 
     kind          : name of the body's kind in C, how it is seen from the root's axes
@@ -46,11 +46,11 @@ class Row:
 
 
 @dataclass
-class Tables:
+class LoopTables:
     """Rows of LOOP_FRAMES and LOOP_BODIES, and the numbers of LOOP_HELD."""
 
     frames: list[str] = field(default_factory=list)
-    bodies: list[Row] = field(default_factory=list)
+    bodies: list[BodyRow] = field(default_factory=list)
     held: list[float] = field(default_factory=lambda: [0.0] * 3)
 
     def hold(self, *numbers: object) -> int:
@@ -85,11 +85,11 @@ class LoopScene:
     seen: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
 
 
-def loop_tables(model: Equations) -> Tables | None:
+def loop_tables(model: Equations) -> LoopTables | None:
     """Returns the tables of a scene whose composite is a loop; None where it is straight code."""
     if not _suits_loop(model):
         return None
-    loop, tables = _loop_scene(model), Tables()
+    loop, tables = _loop_scene(model), LoopTables()
     for frame, group in enumerate(model.resolved.groups):
         (way,) = group.ways
         tables.frames.append(_frame(loop, way.joint, tables))
@@ -122,7 +122,7 @@ def _loop_scene(model: Equations) -> LoopScene:
     )
 
 
-def _frame(loop: LoopScene, joint: Joint | None, tables: Tables) -> str:
+def _frame(loop: LoopScene, joint: Joint | None, tables: LoopTables) -> str:
     """Returns the row of a group's axes.
 
     joint : of the group's vessel that hangs on another group; None for the root's own group
@@ -138,18 +138,18 @@ def _frame(loop: LoopScene, joint: Joint | None, tables: Tables) -> str:
     return f"{{FRAME_INSIDE, {_pose_at(frame)}, {tables.hold(pose.rotation, pose.origin)}, {ports}}}"
 
 
-def _add_body(row: Row, tables: Tables) -> None:
+def _add_body(row: BodyRow, tables: LoopTables) -> None:
     """Adds a row; rows of a kind stand together in blocks of LANES."""
     if tables.bodies and row.kind != tables.bodies[-1].kind:
         _fill_up(tables)
     tables.bodies.append(row)
 
 
-def _fill_up(tables: Tables) -> None:
+def _fill_up(tables: LoopTables) -> None:
     """Completes the last rows of a kind by bodies without mass, which add zeros to sums."""
     while len(tables.bodies) % LANES:
         last = tables.bodies[-1]
-        tables.bodies.append(Row(last.kind, 0, NOWHERE, [0.0] * len(last.held)))
+        tables.bodies.append(BodyRow(last.kind, 0, NOWHERE, [0.0] * len(last.held)))
 
 
 def _pose_at(frame: int) -> int:
@@ -158,7 +158,7 @@ def _pose_at(frame: int) -> int:
     return POSE * LANES * block + lane
 
 
-def _port(loop: LoopScene, name: str, tables: Tables) -> str:
+def _port(loop: LoopScene, name: str, tables: LoopTables) -> str:
     """Returns where a port's position, direction and alignment stand."""
     scene = loop.resolved.scene
     if name in scene.inputs.pose:
@@ -175,13 +175,13 @@ def _constant(place: int) -> str:
     return f"{{1, {place}}}"
 
 
-def _bodies(loop: LoopScene, frame: int, group: RigidGroup, tables: Tables) -> list[Row]:
+def _bodies(loop: LoopScene, frame: int, group: RigidGroup, tables: LoopTables) -> list[BodyRow]:
     """Returns the rows of a group's bodies: its constant vessels as one body, then the vessels that vary."""
     rows = []
     if group.fixed is not None:
         mass, centre, inertia = group.fixed
         kind = f"{_kind(frame)}_FIXED"
-        rows.append(Row(kind, frame, _constant(tables.hold(mass)), _body(centre, inertia)))
+        rows.append(BodyRow(kind, frame, _constant(tables.hold(mass)), _body(centre, inertia)))
     return rows + [_varying_body(loop, frame, group, name, tables) for name in group.varying]
 
 
@@ -190,7 +190,7 @@ def _kind(frame: int) -> str:
     return "BODY" if frame else "BODY_OWN"
 
 
-def _varying_body(loop: LoopScene, frame: int, group: RigidGroup, name: str, tables: Tables) -> Row:
+def _varying_body(loop: LoopScene, frame: int, group: RigidGroup, name: str, tables: LoopTables) -> BodyRow:
     """Returns the row of a vessel whose mass or moments vary."""
     vessel, inputs = loop.resolved.scene.vessels[name], loop.inputs
     given = f"{name}.mass" in inputs
@@ -200,13 +200,13 @@ def _varying_body(loop: LoopScene, frame: int, group: RigidGroup, name: str, tab
     centre, specific = loop.seen[name]
     own_axes = frame > 0 and name == group.reference and not any(vessel.centre_of_mass)
     if own_axes and free:
-        return Row("BODY_DIAGONAL_FREE", frame, mass, moments=moments)
+        return BodyRow("BODY_DIAGONAL_FREE", frame, mass, moments=moments)
     if own_axes and vessel.pmi is not None:
-        return Row("BODY_DIAGONAL", frame, mass, vessel.pmi)
+        return BodyRow("BODY_DIAGONAL", frame, mass, vessel.pmi)
     if free:
         R_group_vessel = np.ravel(np.array(ca.evalf(group.inside[name].rotation)), order="F")
-        return Row(f"{_kind(frame)}_FREE", frame, mass, [*R_group_vessel, *centre], moments)
-    return Row(f"{_kind(frame)}_SCALED", frame, mass, _body(centre, specific))
+        return BodyRow(f"{_kind(frame)}_FREE", frame, mass, [*R_group_vessel, *centre], moments)
+    return BodyRow(f"{_kind(frame)}_SCALED", frame, mass, _body(centre, specific))
 
 
 def _body(centre: NDArray[np.float64], inertia: NDArray[np.float64]) -> list[float]:
@@ -214,7 +214,7 @@ def _body(centre: NDArray[np.float64], inertia: NDArray[np.float64]) -> list[flo
     return [*centre, *(inertia[i, j] for i, j in UPPER_TRIANGLE)]
 
 
-def _body_rows(tables: Tables) -> list[str]:
+def _body_rows(tables: LoopTables) -> list[str]:
     """Returns LOOP_BODIES; the constants of bodies that are seen together are held side by side."""
     rows = []
     for first in range(0, len(tables.bodies), LANES):
@@ -232,7 +232,7 @@ def loop_functions(model: Equations) -> list[ca.Function]:
     return [*model.functions_beside_composite, *kernels(model.resolved.scene)]
 
 
-def loop_constants(tables: Tables | None) -> dict[str, int]:
+def loop_constants(tables: LoopTables | None) -> dict[str, int]:
     """Returns what the C layer must know of a loop, by name of the macro."""
     if tables is None:
         return {}
@@ -248,7 +248,7 @@ def loop_constants(tables: Tables | None) -> dict[str, int]:
     }
 
 
-def loop_source(tables: Tables | None) -> str:
+def loop_source(tables: LoopTables | None) -> str:
     """Returns the tables, C; empty without a loop."""
     if tables is None:
         return ""

@@ -64,7 +64,7 @@ def follow(raw: dict[str, Any], driver: Driver, history: list[tuple[list[str], i
 @pytest.mark.parametrize("kept", KEPT, ids=" ".join)
 @settings(deadline=None, derandomize=True, max_examples=10, phases=(Phase.explicit, Phase.generate))
 @given(seed=st.integers(0, 10**6), count=st.integers(2, 20), history=HISTORIES)
-def test_books_of_the_reference_close(kept, seed, count, history):
+def test_the_reference_balances_momentum_over_random_histories(kept, seed, count, history):
     raw = assembly(seed, count, mass_change=kept[0], pose_change=kept[1])
     follow(raw, ByReference(raw), history)
 
@@ -72,7 +72,7 @@ def test_books_of_the_reference_close(kept, seed, count, history):
 @pytest.mark.parametrize("count", [3, 20])
 @settings(deadline=None, derandomize=True, max_examples=10, phases=(Phase.explicit, Phase.generate))
 @given(history=HISTORIES)
-def test_books_of_the_fmu_close(count, history):
+def test_the_fmu_balances_momentum_over_random_histories(count, history):
     raw = assembly(count, count, mass_change="rate", pose_change="momentum")
     driver = ByFmu(raw, optimised=count < 20)  # many vessels take half a minute
     follow(raw, driver, history)
@@ -84,7 +84,7 @@ def test_books_of_the_fmu_close(count, history):
 @pytest.mark.parametrize("kept", KEPT, ids=" ".join)
 @settings(deadline=None, derandomize=True, max_examples=5, phases=(Phase.explicit, Phase.generate))
 @given(history=HISTORIES)
-def test_books_of_the_fmu_close_in_both_interfaces(kept, fmi, driver, history):
+def test_both_interfaces_of_the_fmu_balance_momentum_over_random_histories(kept, fmi, driver, history):
     raw = assembly(3, 3, mass_change=kept[0], pose_change=kept[1])
     flying = driver(raw, fmi)
     follow(raw, flying, history)
@@ -95,6 +95,6 @@ def test_books_of_the_fmu_close_in_both_interfaces(kept, fmi, driver, history):
 @pytest.mark.parametrize("kept", KEPT, ids=" ".join)
 @settings(deadline=None, derandomize=True, max_examples=5, phases=(Phase.explicit, Phase.generate))
 @given(history=HISTORIES)
-def test_books_of_the_twin_close(kept, count, history):
+def test_the_twin_balances_momentum_over_random_histories(kept, count, history):
     raw = assembly(count, count, mass_change=kept[0], pose_change=kept[1])
     follow(raw, ByTwin(raw), history)

@@ -177,7 +177,7 @@ def test_the_end_asked_for_is_that_of_a_run_stopped_there():
     listener.free()
 
 
-def test_a_later_wish_for_an_earlier_end_counts():
+def test_of_several_ends_asked_for_the_last_one_counts():
     def update(listener: Listener, time: float, flags: list[bool], wanted: Any, return_time: Any) -> None:
         wanted[0], return_time[0] = True, 0.75 if time < 0.5 else 0.625
 
@@ -187,7 +187,7 @@ def test_a_later_wish_for_an_earlier_end_counts():
 
 
 @pytest.mark.parametrize("at", [0.0, 0.1, -5.0, -INF])
-def test_an_end_that_has_passed_means_now(at):
+def test_a_step_asked_to_end_in_the_past_ends_now(at):
     listener = Listener(STEADY, ending(at))
     assert listener.fly(1.0) == (OK, True, 0.25)
     listener.free()
@@ -201,13 +201,13 @@ def test_an_end_that_is_not_before_the_steps_own_changes_nothing(at):
     listener.free()
 
 
-def test_asking_at_the_end_of_the_step_is_no_early_return():
+def test_a_request_at_the_end_of_the_step_is_no_early_return():
     listener = Listener(STEADY, ending(at=1.0, when=1.0))
     assert listener.fly(1.0) == (OK, False, 1.0)
     listener.free()
 
 
-def test_a_time_without_a_request_changes_nothing():
+def test_an_early_return_time_without_a_request_changes_nothing():
     def update(listener: Listener, time: float, flags: list[bool], wanted: Any, return_time: Any) -> None:
         return_time[0] = 0.3
 
@@ -216,7 +216,7 @@ def test_a_time_without_a_request_changes_nothing():
     listener.free()
 
 
-def test_a_request_without_a_time_means_now():
+def test_a_step_asked_to_end_without_a_time_ends_now():
     def update(listener: Listener, time: float, flags: list[bool], wanted: Any, return_time: Any) -> None:
         wanted[0] = True
 
@@ -286,7 +286,7 @@ def test_what_is_not_allowed_within_a_step_ends_it_as_an_error_with_one_line(nam
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_after_such_an_error_reset_makes_an_instance_fly_like_a_new_one(name):
+def test_reset_after_an_error_within_a_step_makes_an_instance_fly_like_a_new_one(name):
     listener = Listener(STEADY, lambda i, *_: REFUSED[name](i) and None)
     listener.fly(1.0)
     assert listener.fly(0.5)[0] == ERROR

@@ -191,7 +191,7 @@ def test_an_output_that_is_an_input_is_refused(tmp_path, how):
         check_output(output, [tmp_path / "not there", scene])
 
 
-def test_what_holds_something_is_told_from_what_does_not(tmp_path):
+def test_a_check_says_whether_the_output_file_holds_something(tmp_path):
     for name, content in (("full", b"old"), ("empty", b"")):
         (tmp_path / name).write_bytes(content)
     assert [check_output(tmp_path / name) for name in ("full", "empty", "none")] == [True, False, False]

@@ -44,7 +44,7 @@ def test_ships_may_swap_at_a_hub_without_mass() -> None:
     )
 
 
-def test_what_the_fmu_refuses_there_is_nan() -> None:
+def test_a_change_that_the_fmu_refuses_at_a_hub_without_mass_is_nan() -> None:
     twin, instance = ByTwin(HUB), Instance(HUB)
     assert instance.initialise() == 0
     assert instance.set(SWAP | MOVE) == 0
@@ -56,7 +56,9 @@ def test_what_the_fmu_refuses_there_is_nan() -> None:
 
 @pytest.mark.parametrize("mode", ["forward", "reverse"])
 @pytest.mark.parametrize("inputs", [SWAP, {}], ids=["swap", "nothing"])
-def test_derivatives_by_the_rate_are_finite_there_and_those_of_differences(inputs: Values, mode: str) -> None:
+def test_derivatives_by_the_rate_at_a_hub_without_mass_are_those_of_differences(
+    inputs: Values, mode: str
+) -> None:
     twin = Twin(scene(HUB))
     p_next = twin.p_with(inputs)
     x, direction = ca.SX.sym("x", 7), np.arange(1.0, 8.0)

@@ -225,7 +225,7 @@ def test_derivatives_of_many_sub_steps_are_those_of_the_motion(folder: Path) -> 
         assert np.abs(found - truth).max() <= error
 
 
-def test_what_calls_it_cannot_be_compiled_and_is_told_why(folder: Path) -> None:
+def test_a_function_that_calls_the_communication_step_cannot_be_generated(folder: Path) -> None:
     twin = twin_of("no p")
     steps = twin.communication_step(folder).mapaccum(3)
     with pytest.raises(BuildError, match="undefined symbol: communication_step"):
@@ -233,7 +233,7 @@ def test_what_calls_it_cannot_be_compiled_and_is_told_why(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["taylor", "docks", "no p"])
-def test_its_c_compiles_without_warnings(name: str, tmp_path: Path) -> None:
+def test_c_of_the_communication_step_compiles_without_warnings(name: str, tmp_path: Path) -> None:
     (tmp_path / "scene.h").write_text(generate(twin_of(name).scene, 3)[0]["scene.h"])
     strict = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wstrict-prototypes", "-Werror"]
     compiler = [
@@ -253,7 +253,7 @@ def test_its_c_compiles_without_warnings(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("count", [0, 2.5, "3"])
-def test_a_count_of_sub_steps_that_is_none_is_refused(count: Any, folder: Path) -> None:
+def test_sub_steps_that_are_no_whole_number_from_one_are_refused(count: Any, folder: Path) -> None:
     message = rf"^communication_step: {count!r} sub-steps: must be a whole number from 1$"
     with pytest.raises(ValueError, match=message):
         twin_of("taylor").communication_step(folder, count)
