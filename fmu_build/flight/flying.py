@@ -1,4 +1,4 @@
-"""Choices flown through an experiment, each in a process of its own."""
+"""Flights of choices, see `choices.Choice`, through an experiment, each in a process of its own."""
 
 import json
 import os
@@ -25,24 +25,24 @@ from supervessel.shell.processes import run
 Array = NDArray[np.float64]
 
 TIMING = 0.25
-"""Seconds that the clock may take of a flight; a flight that takes longer is timed once."""
+"""Time [s] that the timing of a flight may take in all; a longer flight is timed once."""
 
 TIME_LIMIT = 300.0
-"""Seconds after which a flight is given up."""
+"""Time [s] after which a flight is given up."""
 
 OUT_OF_TIME = f"did not end within {TIME_LIMIT:g} s"
 
 
 @dataclass(frozen=True)
 class Flown:
-    """What came of a choice.
+    """The result of a choice's flight.
 
-    refused     : why it could not be flown, or None; then the others are 0 and empty
-    nanoseconds : of a communication step: moving inputs set, step, attitude and rate got
-    ratio       : of that to a plain RK4 step, timed in turn with it
-    sub_steps   : of the whole flight
+    refused     : why it could not be flown; all other fields are then 0 or empty. None: it was flown
+    nanoseconds : time of a communication step [ns]: set moving inputs, step, get attitude and rate
+    ratio       : that time over the time of a plain RK4 step, measured in turn with it
+    sub_steps   : number of sub-steps of the whole flight
     size        : of the library [bytes]
-    samples     : attitude and angular velocity, (n, 7), at the course's samples
+    samples     : q_inertial_body and angular velocity [rad/s], body axes, (n, 7), at the course's samples
     """
 
     refused: str | None
@@ -56,11 +56,11 @@ class Flown:
 def fly_all(
     scene: Scene, choices: Sequence[Choice], shop: Workshop, done: Callable[[str], None] = lambda _: None
 ) -> dict[Choice, Flown]:
-    """Returns what came of choices; those not flown before are built, two at a time, then flown one by one.
+    """Returns the results of choices; those not flown before are built, two at a time, then flown one by one.
 
-    done : told of each that is finished
-    Each result is kept as soon as it is there. Raises TradeError if one cannot be kept, BuildError if the
-    compiler fails.
+    done : called with a text for each choice that is built or flown
+    Each result is kept at once. Raises TradeError if a result cannot be kept or a process breaks down,
+    BuildError if the compiler fails.
     """
     course = course_of(scene)
     places = {choice: place_of("trade", scene, asdict(choice)) for choice in choices}
@@ -81,7 +81,7 @@ def fly_all(
 
 
 def _fly(built: Built, choice: Choice, course: Course, shop: Workshop) -> Flown:
-    """Returns what came of a flight in a process of its own."""
+    """Returns the result of a flight in a process of its own. Raises TradeError if the process fails."""
     moving = {name: v for name, v in course.numbers.items() if _is_input(built, choice, name)}
     inputs = InputCourses(
         np.arange(course.steps),
@@ -110,11 +110,11 @@ def _fly(built: Built, choice: Choice, course: Course, shop: Workshop) -> Flown:
 
 @dataclass(frozen=True)
 class InputCourses:
-    """What inputs do in a flight.
+    """Values of the moving inputs in a flight.
 
-    rows     : numbers of the communication steps before which they are set, ascending, from 0
-    numbers  : values of inputs that are numbers, (rows, n)
-    booleans : of docks, (rows, m), 0 and 1
+    rows     : (r,), numbers of the communication steps before which inputs are set, ascending, from 0
+    numbers  : (r, n), values of the inputs that are numbers, each in its unit
+    booleans : (r, m), values of docks, 0 and 1
     """
 
     rows: NDArray[np.int64]
@@ -122,9 +122,10 @@ class InputCourses:
     booleans: Array
 
     def written(self, file: Path, *, once: bool = False) -> dict[str, Any]:
-        """Writes them into files that begin with that name and returns how host.py finds them.
+        """Writes the values into three files and returns their paths as host.py takes them.
 
-        once : whether files that are there already are these
+        file : path of the files without their suffixes
+        once : whether existing files hold these values already
         """
         kinds = {"rows": np.int64, "numbers": np.float64, "booleans": np.bool_}
         places = {key: file.with_suffix(f".{key}") for key in kinds}
@@ -134,7 +135,10 @@ class InputCourses:
 
 
 def job_of(choice: Choice, course: Course, seconds: float) -> dict[str, Any]:
-    """Returns what host.py is told of flights through an experiment; seconds for timing, 0: none."""
+    """Returns the part of host.py's job that describes an experiment.
+
+    seconds : time that timing may take [s]; 0: no timing
+    """
     return {
         "tolerance": choice.tolerance or 0.0,
         "size": course.size,
@@ -152,13 +156,13 @@ def run_host(
     names: tuple[Sequence[str], Sequence[str]],
     courses: Sequence[Mapping[str, Any]],
 ) -> tuple[list[dict[str, Any]], bytes] | str | None:
-    """Returns what came of a job in a process of its own, see host.py, and the samples that it has left.
+    """Returns the results of a job of host.py, run in a process of its own, and its samples as bytes.
 
     folder  : of the workshop
-    job     : tolerance, sizes, steps, samples, timing, as host.py wants them
-    names   : of the inputs that move, numbers and docks
-    courses : what they do in each flight, as `InputCourses.written` returns it
-    Returns None if the process does not end in time, a text if it breaks down.
+    job     : from `job_of`
+    names   : of the inputs that move: those that are numbers, and docks
+    courses : of each flight, the paths that `InputCourses.written` returns
+    Returns None if the process does not end within TIME_LIMIT, a text if it breaks down.
     """
     shown = [f"{name}[{i}]" for name, n in zip(SHOWN, (4, 3), strict=True) for i in range(1, n + 1)]
     with tempfile.TemporaryDirectory(dir=folder, prefix="job-") as place:
@@ -188,12 +192,12 @@ def run_host(
 
 
 def surroundings_of_python() -> dict[str, str]:
-    """Returns all the variables that a process of Python's gets: where its own libraries are."""
+    """Returns the environment variables of a Python process: those by which it finds its own libraries."""
     return {name: os.environ[name] for name in (*NEEDED, *LIBRARIES) if name in os.environ}
 
 
 def _is_input(built: Built, choice: Choice, name: str) -> bool:
-    """Whether an input is left; only those of what is frozen are not."""
+    """Whether a choice's library has an input: it lacks inputs that the choice leaves at their start."""
     return name in built.references or not choice.model.frozen
 
 
@@ -202,7 +206,7 @@ def _refused(reason: str) -> Flown:
 
 
 def _read(place: Path, samples: int) -> Flown | None:
-    """Returns the flight that is kept in a place, None where there is none with so many samples."""
+    """Returns the flight that is kept in a file, None where there is no valid one with that many samples."""
 
     def is_flight(kept: Any) -> bool:
         refused, shape = kept["refused"], np.array(kept["samples"], dtype=np.float64).reshape(-1, 7).shape

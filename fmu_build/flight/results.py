@@ -1,4 +1,4 @@
-"""What has been flown and found, kept by content: under a name that says everything that it depends on."""
+"""Results of flights and searches in the cache, each under a digest of everything that it depends on."""
 
 import hashlib
 import json
@@ -27,10 +27,11 @@ on them: they are part of what a result is kept under."""
 
 
 def place_of(kind: str, scene: Scene, what: Any) -> Path:
-    """Returns where something is kept that was found about a scene.
+    """Returns the file of a result about a scene.
 
     kind : folder in the cache
-    what : it was, as JSON takes it
+    what : the question that the result answers, as JSON
+    The name is a digest of scene, question, this machine, versions, and the files of both packages.
     """
     said = json.dumps([scene.model_dump(mode="json"), what, _maker()], sort_keys=True)
     return place_of_result(kind, said.encode())
@@ -38,7 +39,7 @@ def place_of(kind: str, scene: Scene, what: Any) -> Path:
 
 @cache
 def _maker() -> list[str]:
-    """Returns what turns a choice into a result: this machine, versions, our own files."""
+    """Returns all else that results depend on: machine, versions, digest of the files of both packages."""
     files = hashlib.sha256()
     for package in (Path(supervessel.__path__[0]), Path(fmu_build.__path__[0])):
         for file in sorted(package.rglob("*")):
@@ -58,9 +59,9 @@ def _maker() -> list[str]:
 
 
 def read(place: Path, is_whole: Callable[[Any], bool] = lambda _: True) -> Any:
-    """Returns what `keep` has kept in a place, None where there is anything else.
+    """Returns the result that `keep` has written into a file, None where there is no valid one.
 
-    is_whole : whether what has been read is what is expected; an error for want of a part says no
+    is_whole : whether a result read from the file is complete; KeyError, TypeError and the like count as no
     """
     try:
         whole = json.loads((read_file(place) or b"").decode())
@@ -73,9 +74,9 @@ def read(place: Path, is_whole: Callable[[Any], bool] = lambda _: True) -> Any:
 
 
 def keep(place: Path, found: Any) -> None:
-    """Keeps something, as JSON takes it, beside a digest of it and of its place's name.
+    """Writes a result, as JSON, beside a digest of it and of the file's name.
 
-    Whatever else is in that place is removed. Raises TradeError if it cannot be written.
+    Anything else at that path is removed first. Raises TradeError if the file cannot be written.
     """
     if os.path.lexists(place) and (place.is_symlink() or not place.is_file()):
         remove(place)  # a link is not followed, a pipe not waited for

@@ -1,4 +1,4 @@
-"""Libraries of choices, and of the host that flies them, built in a folder for as long as they are needed."""
+"""Builds of the libraries of choices, and of the host that flies them, in a folder that is removed later."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -23,7 +23,7 @@ from supervessel.shell.processes import Workers
 HERE = Path(__file__).parent
 
 HOST_FLAGS = (*FLAGS, f"-DSHOWN={SHOWN}", f"-DMESSAGE_SIZE={MESSAGE_SIZE}")
-"""What host.c is compiled with."""
+"""Compiler flags of host.c."""
 
 AT_ONCE = 2
 """Builds at the same time."""
@@ -31,7 +31,13 @@ AT_ONCE = 2
 
 @dataclass(frozen=True)
 class Built:
-    """A choice's library, what must be known to call it, and what it was made from."""
+    """The library of a choice.
+
+    model      : the equations that it was made from
+    library    : path of the shared library
+    token      : instantiation token
+    references : value references by the names of the variables
+    """
 
     model: Equations
     library: Path
@@ -41,7 +47,7 @@ class Built:
 
 @dataclass(frozen=True)
 class Workshop:
-    """Where a trade works: a folder for as long as it lasts, and what has been built there.
+    """The folder of a trade or a search, and the libraries that have been built in it.
 
     trial : whether libraries are compiled without optimisation: the same numbers, slower, much sooner there
     """
@@ -63,7 +69,10 @@ def workshop(*, trial: bool = False) -> Iterator[Workshop]:
 
 
 def build_all(scene: Scene, choices: Sequence[Choice], shop: Workshop, done: Callable[[str], None]) -> None:
-    """Builds the libraries of choices, and the host's, as far as they are not there."""
+    """Builds the missing libraries of choices, and that of the host if it is missing.
+
+    done : called with a text for each library that is built
+    """
     wanted = [choice for choice in dict.fromkeys(map(source_of, choices)) if choice not in shop.built]
     if not wanted:
         return
@@ -88,7 +97,7 @@ def source_of(choice: Choice) -> Choice:
 
 
 def builds(choices: Sequence[Choice], shop: Workshop) -> int:
-    """Returns how many libraries choices need that are not there."""
+    """Returns the number of libraries that have to be built for choices."""
     return len({source_of(choice) for choice in choices} - shop.built.keys())
 
 
@@ -101,7 +110,11 @@ def _sources(scene: Scene, model: Equations) -> tuple[dict[str, bytes], list[str
 def _compile(
     packed: Mapping[str, bytes], names: Sequence[str], identifier: str, folder: Path, *, trial: bool
 ) -> Path:
-    """Returns the library that sources make."""
+    """Returns the path of the library compiled from C sources.
+
+    packed, names : files of sources/ by archive path, and names of those to compile
+    trial         : whether without optimisation
+    """
     flags = TRIAL_FLAGS if trial else FLAGS
     [(path, library)] = compile_sources(packed, names, 3, (host_platform(),), identifier, flags).items()
     folder.mkdir()

@@ -1,13 +1,13 @@
-"""What is kept from one run to the next: what compilers have made, results, choices.
+"""The cache on disk: compiled files, results and choices that are kept from one run to the next.
 
-All of it is in supervessel-N (N: version of this layout) below the user's cache folder, or below the folder
-that SUPERVESSEL_CACHE names. In it are generations: the newest is in use, and when it has grown large
-another begins; an older one is removed whole when nobody has used it for an hour. Nothing outside of
-supervessel-N is ever removed, and nothing by way of a link.
+The cache is the folder supervessel-N, N the version of its layout, below the user's cache folder or below the
+folder that SUPERVESSEL_CACHE names. It holds generations, folders of which the newest is in use. When that
+one has grown large, a new one begins; an older one is removed whole when nobody has used it for an hour.
+Nothing outside supervessel-N is ever removed, and no link is followed to remove anything.
 
-Who can write into a cache can have anything compiled or believed. So a cache in a folder that others may
-write, or that belongs to another user, is left unused. That goes by owners and permissions as POSIX has them;
-on Windows, where the user's cache folder is closed to others by inheritance, they are not looked at.
+Whoever can write into a cache decides what is compiled and which results are believed. So a cache is left
+unused if others can write into its folder or it belongs to another user. This is judged by POSIX owners and
+permissions; on Windows, where the user's cache folder is closed to others by inheritance, it is not judged.
 """
 
 import errno
@@ -36,7 +36,7 @@ from supervessel.problems import printable
 from supervessel.shell.console import print_problem
 
 LAYOUT = 2
-"""Version of what is where; counted up whenever that changes."""
+"""Version of the layout of the cache; counted up whenever that changes."""
 
 OURS = f"supervessel-{LAYOUT}"
 
@@ -49,20 +49,20 @@ Signature: 8a477f597d28d172789f06886806bc55
 """
 
 LARGEST = 2 << 30
-"""Bytes; a generation that is found to hold more is followed by the next."""
+"""Size of a generation [bytes] beyond which a new one begins."""
 
 MEASURED_EVERY = 256
-"""Compilations of a generation after which it is measured: that takes half a second for 100000 files."""
+"""Compilations after which a generation's size is measured: that takes half a second for 100000 files."""
 
 UNUSED = 3600.0
-"""Seconds after which a generation that is not the newest is removed; no compiler runs for half as long."""
+"""Time without use [s] after which an older generation is removed; no compiler runs for half as long."""
 
 LARGEST_FILE = 64 << 20
-"""Bytes; no file that is kept to be read again is as large."""
+"""Size [bytes] that no file in the cache reaches; larger files are not read."""
 
 USED, FULL, LOCK = "used", "full", "lock"
-"""Files in a generation: a byte for each compilation, as old as the last use; there once it is too large;
-locked, shared, while a compiler works."""
+"""Files in a generation. `used` has a byte for each compilation and the time of the last use; `full` exists
+once the generation is too large; `lock` has a shared lock while a compiler works in it."""
 
 FULL_DISK = (
     errno.ENOSPC,
@@ -254,7 +254,7 @@ def _is_private(folder: Path) -> bool:
 
 @contextmanager
 def in_use(generation: Path) -> Iterator[None]:
-    """Has a generation known as in use while a compiler works in it: it is then not cleared."""
+    """Marks a generation as in use while a compiler works in it: `cache --clear` then leaves it."""
     file = open_lock(generation / LOCK)
     if file is None:  # it goes on without
         yield
@@ -278,7 +278,7 @@ def is_in_use(generation: Path) -> bool:
 
 
 def open_lock(file: Path) -> int | None:
-    """Returns a file that is opened to be locked, made if need be; None where it cannot be."""
+    """Returns the descriptor of a lock file, made if need be; None where it cannot be opened."""
     try:
         return os.open(file, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)
     except OSError:
@@ -286,18 +286,18 @@ def open_lock(file: Path) -> int | None:
 
 
 def generation_numbers(ours: Path) -> list[int]:
-    """Returns the numbers of the generations that are there, whatever has such a name."""
+    """Returns the numbers of all generations of a cache, by the names of its entries."""
     found = (re.fullmatch(r"generation-(\d{1,18})", name) for name in os.listdir(ours))  # noqa: PTH208
     return [int(match[1]) for match in found if match]
 
 
 def retire(generation: Path) -> None:
-    """Has a generation be followed by another."""
+    """Marks a generation as full, so that a new one begins."""
     _touch(generation / FULL)
 
 
 def _touch(file: Path, more: bytes = b"") -> int:
-    """Has a file say that it has just been used, adds to it, and returns its size; 0 where that fails."""
+    """Appends bytes to a file, sets its time to now and returns its size; 0 where that fails."""
     flags = (
         os.O_WRONLY | os.O_APPEND | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
     )
@@ -326,7 +326,7 @@ def _is_unused(generation: Path) -> bool:
 
 
 def count_compilation(generation: Path) -> None:
-    """Has a generation know that something was compiled; now and then it is measured, and full when large."""
+    """Counts a compilation in a generation; every MEASURED_EVERY of them marks it full if it is large."""
     count = _touch(generation / USED, b".")
     if count and count % MEASURED_EVERY == 0 and size_of(generation) > LARGEST:
         retire(generation)
@@ -344,7 +344,7 @@ def size_of(folder: Path) -> int:
 
 
 def remove(path: Path) -> None:
-    """Removes what has a name, a real folder of the user's own whole; of a link only the link."""
+    """Removes a path: a folder of the user's own with all its content, else a file or the link itself."""
     if is_own_folder(path):
         shutil.rmtree(path, ignore_errors=True)
     else:
@@ -353,7 +353,7 @@ def remove(path: Path) -> None:
 
 
 def folder_for(kind: str) -> Path:
-    """Returns a folder in the generation in use, for things of a kind; what is in its place is removed."""
+    """Returns the folder of a kind in the generation in use; anything else at its path is removed."""
     folder = cache_folder() / kind
     if not is_own_folder(folder):
         remove(folder)
@@ -371,12 +371,12 @@ def place_of_result(kind: str, question: bytes) -> Path:
 
 
 def place_of_library(question: bytes) -> Path:
-    """Returns the file in which the library is kept that answers a question."""
+    """Returns the file in which the library is kept that was compiled from all that `question` holds."""
     return folder_for("libraries") / sha256(question).hexdigest()
 
 
 def keep_bytes(place: Path, content: bytes) -> None:
-    """Keeps bytes behind a digest of them and of their place's name; nothing where they cannot be written."""
+    """Writes a file of a digest and the bytes; the digest is of bytes and file name. Ignores a failure."""
     with suppress(OSError), tempfile.NamedTemporaryFile(dir=place.parent, delete=False) as part:
         try:
             part.write(_digest(place, content) + content)
@@ -389,7 +389,7 @@ def keep_bytes(place: Path, content: bytes) -> None:
 
 
 def read_bytes(place: Path) -> bytes | None:
-    """Returns what is kept in a place, None where there is nothing, or something that has been changed."""
+    """Returns the bytes that `keep_bytes` wrote; None where there is no such file or its digest is wrong."""
     whole = read_file(place) or b""
     digest, content = whole[:32], whole[32:]
     return content if content and digest == _digest(place, content) else None
@@ -400,9 +400,9 @@ def _digest(place: Path, content: bytes) -> bytes:
 
 
 def read_file(file: Path) -> bytes | None:
-    """Returns the content of a regular file, None where there is anything else, or more than we keep.
+    """Returns the content of a regular file of up to LARGEST_FILE bytes, None for anything else.
 
-    It is never waited for, and a link is not followed.
+    A link is not followed, and a pipe or device is not waited for.
     """
     flags = os.O_RDONLY
     for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"):
@@ -424,7 +424,7 @@ def read_file(file: Path) -> bytes | None:
 
 
 def reason(error: OSError, purpose: str) -> str:
-    """Returns what went wrong: no room, or the system's own words and where."""
+    """Returns an error's reason for a message: that the disk is full, or the system's own words."""
     words = error.strerror or str(error)
     return f"no room {purpose}: {words}" if error.errno in FULL_DISK else words
 

@@ -1,8 +1,8 @@
-"""What the compiler has made for itself in the cache, its C library and its runtime, is as it was made.
+"""A check that the compiler's own files in the cache, its C library and its runtime, are as it made them.
 
-The compiler believes whatever it finds there. So a record says what has been found there after it had ended,
-and what has changed since is noticed before the compiler starts. Its manifests are not in the record: it
-writes them itself again and again, and one that it cannot read is to it as if it were missing.
+The compiler uses whatever it finds in its folder. So the digests of all files there are recorded after it has
+ended and compared before it starts again. Its manifests are not recorded: it rewrites them again and again,
+and treats one that it cannot read as missing.
 """
 
 import functools
@@ -13,7 +13,7 @@ from pathlib import Path
 from fmu_build.storage.cache import folder_for, is_in_use, keep_bytes, read_bytes, read_file, retire
 
 FOLDER = "compiler"
-"""In a generation, all that the compiler keeps from one run to the next."""
+"""Folder in a generation for all that the compiler keeps from one run to the next."""
 
 RECORD = "compiler.sha256"
 
@@ -22,10 +22,10 @@ MANIFESTS, UNFINISHED = "h", "tmp"
 
 
 def compiler_folder() -> Path:
-    """Returns the folder of the compiler's own files, none of which has changed since they were recorded.
+    """Returns the folder of the compiler's own files, in the generation of the cache that is in use.
 
-    It is in the generation of the cache that is in use. Where something has changed another generation is
-    begun; that is looked for once in a program.
+    If a file has changed since it was recorded, a new generation with an empty folder begins. This is checked
+    once in a program.
     """
     folder = folder_for(FOLDER)
     if _was_changed(folder):
