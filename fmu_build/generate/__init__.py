@@ -1,1 +1,1 @@
-"""C that is particular to a scene, and the files that an FMU is compiled from."""
+"""The C code of a scene, and the files that its FMU is compiled from."""

@@ -1,4 +1,4 @@
-"""C tables of what may change while a scene runs: the kinds of its inputs, and its docks."""
+"""C macros and tables about changes of inputs: the kind of change of each input, and the docks."""
 
 from supervessel.equations import Equations
 from supervessel.scene.inputs import vessel_of
@@ -6,7 +6,17 @@ from supervessel.scene.schema import keeps_momentum
 
 
 def change_constants(model: Equations) -> dict[str, int]:
-    """Returns what the C layer must know of a scene's changes, by name of the macro."""
+    """Returns by name the macros that describe a scene's changes of inputs; see fmu_build/c/changes.h.
+
+    CHANGES              : 1 if a change of inputs can change the angular velocity
+    STATE_IS_MOMENTUM    : 1 if the angular momentum is a state of model exchange
+    MASSES_KEEP_MOMENTUM : 1 if a change of masses or moments keeps the angular momentum
+    POSES_KEEP_MOMENTUM  : 1 if a change of poses keeps it
+    SPINS                : 1 if ports move, so that c has the part momentum
+    COMPOSITE_SPIN       : place of that part in c
+    DOCK_COUNT           : number of docks if any can open, else 0
+    VESSEL_COUNT         : number of vessels
+    """
     scene = model.resolved.scene
     keeps = scene.keeps
     return {
@@ -24,7 +34,7 @@ def change_constants(model: Equations) -> dict[str, int]:
 
 
 def change_tables(model: Equations) -> str:
-    """Returns the tables that go with `change_constants`, C; empty where nothing changes the rate."""
+    """Returns C of the tables INPUT_KINDS and DOCKS, each where the scene needs it; "" if it needs none."""
     text, resolved = "", model.resolved
     if model.change is not None:
         kinds = ", ".join(f"KIND_{variable.kind.change.upper()}" for variable in resolved.shaping)
@@ -36,7 +46,7 @@ def change_tables(model: Equations) -> str:
 
 
 def _dock_rows(model: Equations) -> list[str]:
-    """Returns a row for each dock: its ports, their vessels, where its input and its motion stand."""
+    """Returns the rows of DOCKS: names of ports and vessels, numbers of vessels, places in p and k or -1."""
     scene = model.resolved.scene
     vessels = {name: number for number, name in enumerate(scene.vessels)}
     rows = []

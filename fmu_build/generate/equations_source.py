@@ -15,7 +15,10 @@ from supervessel.problems import printable
 
 
 def model_source(functions: Iterable[ca.Function]) -> str:
-    """Returns model.c: the scene's equations as C functions without external symbols of their own."""
+    """Returns model.c: the scene's equations as C functions; no name of CasADi's is external.
+
+    Raises BuildError if an equation cannot be generated as C, or the temporary folder cannot be used.
+    """
     generator = ca.CodeGenerator("model.c", {"with_export": False, "casadi_int": "int", "verbose": False})
     for function in functions:
         generator.add(function)
@@ -32,16 +35,19 @@ DEFINITION = re.compile(r"^(static int casadi_f\d+\(.*\) \{\n)((?:(?!^\}).*\n)*)
 
 
 def _dividing_as_written(function: re.Match[str]) -> str:
-    """Returns a function of generated C; one that divides more than once begins with the prelude's macro."""
+    """Returns a function of generated C, beginning with DIVIDES_ONLY_AS_WRITTEN if it divides more than once.
+
+    function : a match of DEFINITION
+    """
     beginning, body = function.groups()
     mark = "  DIVIDES_ONLY_AS_WRITTEN\n" if body.count("/") > 1 else ""
     return beginning + mark + body
 
 
 def generated_c(generator: ca.CodeGenerator, file: str) -> str:
-    """Returns the C that a generator writes into a file of that name, by way of a temporary folder.
+    """Returns the C that a generator writes into a file of that name, in a temporary folder.
 
-    Raises BuildError where that folder cannot be used.
+    Raises BuildError if that folder cannot be used.
     """
     try:
         with temporary_folder() as folder:
@@ -60,10 +66,10 @@ def generated_c(generator: ca.CodeGenerator, file: str) -> str:
 
 
 def _without_null_checks(source: str) -> str:
-    """Returns generated C that takes every argument and result for given, as the C layer always does.
+    """Returns generated C without tests for missing arguments and results; the C layer always gives all.
 
-    CasADi lets a caller leave out an argument (then zero) or a result, and asks at each element: an eighth
-    of the time of a step.
+    CasADi lets a caller leave out an argument (then zero) or a result, and tests for it at each element: an
+    eighth of the time of a step.
     """
     source = re.sub(r"=arg\[(\d+)\]\? arg\[\1\]\[(\d+)\] : 0;", r"=arg[\1][\2];", source)
     return re.sub(r"if \(res\[(\d+)\]!=0\) res\[\1\]", r"res[\1]", source)

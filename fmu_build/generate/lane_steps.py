@@ -1,4 +1,7 @@
-"""lane_kernels.h: C that takes the steps of a composite's loop for several vessels at once."""
+"""lane_kernels.h: C functions that take the steps of a composite's loop for several vessels at once.
+
+A lane is the part of a vector register that holds the number of one vessel; see fmu_build/c/lanes.h.
+"""
 
 import casadi as ca
 
@@ -16,7 +19,7 @@ OPERATIONS = {
     ca.OP_SQRT: "lanes_sqrt({})",
     ca.OP_FABS: "lanes_fabs({})",
 }
-"""What the steps for several vessels at once are made of, C on numbers of type Lanes."""
+"""By CasADi's code of an operation, its C on numbers of type Lanes: all operations that the steps contain."""
 
 
 def loop_steps(scene: Scene) -> str:
@@ -28,7 +31,7 @@ def loop_steps(scene: Scene) -> str:
 
 
 def _lane_code(function: ca.Function) -> str:
-    """Returns straight C of a function, operation by operation as CasADi has put them in order."""
+    """Returns C of a function without branches or loops: its operations in CasADi's order."""
     lines = []
     for number in range(function.n_instructions()):
         kind, to = function.instruction_id(number), function.instruction_output(number)

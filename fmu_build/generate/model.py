@@ -1,4 +1,4 @@
-"""What is particular to a scene in its FMU: the C files, and modelDescription.xml with their token."""
+"""The files of an FMU that depend on its scene: C files, and modelDescription.xml with their token."""
 
 from collections.abc import Sequence
 
@@ -17,22 +17,24 @@ from supervessel.equations import Equations, equations
 from supervessel.scene.schema import Scene
 
 TOKEN_IN_C = 'MODEL_TOKEN[] = "{}"'
-"""Where the token stands in C that is made of everything else."""
+"""The place of the token in scene.c; the token is a digest of everything else."""
 
 
 def generate(scene: Scene, fmi: int, model: Equations | None = None) -> tuple[dict[str, str], bytes]:
-    """Returns what is particular to a scene: C and H files by name, and modelDescription.xml.
+    """Returns the files that depend on a scene: C and H files by name, and modelDescription.xml.
 
-    The files are those generated from the scene and those of the C layer that were picked for it.
+    The C and H files are those generated from the scene and those of the C layer that were picked for it.
 
-    model : the scene's equations, if they are there already
+    fmi   : number of the version, of VERSIONS
+    model : the scene's equations, if they are known already
+    Raises BuildError if C cannot be generated.
     """
     model = model or equations(scene)
     return generated(model, variable_table(model), fmi)
 
 
 def generated(model: Equations, entries: Sequence[TableEntry], fmi: int) -> tuple[dict[str, str], bytes]:
-    """Returns what `generate` does, from a scene's equations and variable table."""
+    """Returns the same as `generate`, from a scene's equations and variable table."""
     scene, changing = model.resolved.scene, model.change is not None
     loop = loop_tables(model)
     functions = model.functions if loop is None else loop_functions(model)

@@ -1,4 +1,4 @@
-"""The files of the C layer that only some scenes need: which there are, and which a scene's FMU has."""
+"""The choice of files of the C layer: some are in every FMU, the others only where the scene needs them."""
 
 from supervessel.equations import Equations
 from supervessel.rotation.propagators import PROPAGATORS, WHEN_FREE
@@ -23,14 +23,14 @@ CHANGES = frozenset(
 STEPS = frozenset(WHEN_FREE.values()).union(*(method.c_files for method in PROPAGATORS.values()))
 
 PICKED = LOOP | BOOLEANS | CHANGES | STEPS
-"""Names, without .c and .h, of the files that not every FMU has, but for HEADERS."""
+"""Names, without .c and .h, of the files that are not in every FMU, HEADERS excepted."""
 
 HEADERS = frozenset({"changes.h", "docks.h", "booleans.h"})
-"""Headers of such files that are in every FMU: others include them."""
+"""Headers with such names that are in every FMU, because other files include them."""
 
 
 def is_picked(file: str) -> bool:
-    """Whether a file of the C layer is one that not every FMU has."""
+    """Whether a file of the C layer is in an FMU only where its scene needs it."""
     return file.partition(".")[0] in PICKED and file not in HEADERS
 
 

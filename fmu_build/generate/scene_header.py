@@ -1,4 +1,4 @@
-"""scene.h: the counts, places and limits that the C layer must know of a scene."""
+"""scene.h: counts, places and limits of a scene, as enumerators and macros for the C layer."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -60,7 +60,7 @@ def scene_header(
 
 
 def _variables(model: Equations, entries: Sequence[TableEntry]) -> dict[str, int]:
-    """Returns how many variables of each kind there are, and the value reference of the first of each."""
+    """Returns the number of variables of each kind, and the value reference of the first one of each kind."""
     references = {entry.variable.name: entry.reference for entry in entries}
     p, k, u = len(model.names.p), len(model.names.k), len(model.names.u)
     return {
@@ -84,7 +84,7 @@ def _variables(model: Equations, entries: Sequence[TableEntry]) -> dict[str, int
 
 
 def _axes_and_free_motion(model: Equations) -> dict[str, int]:
-    """Returns where principal moments and axes stand in a, and how many numbers free motion carries along."""
+    """Returns the places of parts of a, and the counts of the arrays between the functions of free motion."""
     axes = model.slices.axes
     begun = [function for function in model.steps.propagation if function.name() == "free_start"]
     return {
@@ -97,13 +97,13 @@ def _axes_and_free_motion(model: Equations) -> dict[str, int]:
 
 
 def _parts_of_composite(model: Equations) -> dict[str, int]:
-    """Returns where the parts of c stand that the C layer reads."""
+    """Returns the places in c of the parts that the C layer reads."""
     read = ("mass", "inertia", "margins", "law")
     return {f"COMPOSITE_{name.upper()}": model.slices.composite[name].start for name in read}
 
 
 def _rules(scene: Scene) -> dict[str, int]:
-    """Returns what the C layer checks of a composite.
+    """Returns the rules by which the C layer judges moments and tensors.
 
     LAW_TURNS       : whether the law needs a positive definite tensor
     TRIANGLE_JUDGED : whether moments must satisfy the triangle inequality
@@ -127,7 +127,13 @@ def _work_arrays(functions: Iterable[ca.Function], loop: LoopTables | None) -> d
 
 
 def _plan(model: Equations) -> dict[str, object]:
-    """Returns numbers of the method of co-simulation, and whether a tolerance controls its steps."""
+    """Returns the numbers of the method of co-simulation.
+
+    ERROR_CONTROLLED : 1 if a tolerance controls its sub-steps, 0 if an angle does
+    ERROR_EXPONENT   : power of the size of a sub-step with which its estimated error grows
+    SAFETY           : factor by which the sum of error estimates may exceed the tolerance
+    PRODUCT_COUNT    : number of products of two rates in the law's gyroscopic term
+    """
     method = model.plan.method
     return {
         "ERROR_CONTROLLED": int(method is not None and method.control != "angle"),
@@ -138,7 +144,7 @@ def _plan(model: Equations) -> dict[str, object]:
 
 
 def _limits(scene: Scene) -> dict[str, str]:
-    """Returns the limits that steps keep to."""
+    """Returns the scene's tolerance and its largest angle of a sub-step [rad]."""
     rotation = scene.rotation
     return {
         "TOLERANCE": repr(rotation.tolerance),
@@ -162,7 +168,7 @@ COMMON = {
         for name in LOG_CATEGORIES
     },
 }
-"""Macros for what Python and the C layer share, which stands nowhere else."""
+"""Macros of constants that Python and the C layer share; each is defined once, in Python."""
 
 
 def _lines(form: str, values: Mapping[str, object]) -> str:

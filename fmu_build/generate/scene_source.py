@@ -26,9 +26,9 @@ def scene_source(entries: Sequence[TableEntry], token: str, changing: bool) -> s
 
 
 def _needs(entry: TableEntry, changing: bool) -> frozenset[str]:
-    """Returns what must be up to date before anything that depends on a variable can be read.
+    """Returns the quantities that must be current before an unknown that depends on a variable can be read.
 
-    The names are flags of the C layer, without FOLLOWS_.
+    They are names of flags of fmu_build/c/variable_table.h, without FOLLOWS_.
     """
     if entry.role == "state" and "attitude" in entry.variable.name:
         return frozenset({"STATES", "ATTITUDE"})
@@ -45,9 +45,9 @@ def _shows_axes(variable: Variable) -> bool:
 
 
 def _row(entry: TableEntry, needs: Mapping[int, frozenset[str]]) -> str:
-    """Returns a row of the table.
+    """Returns a row of VARIABLES.
 
-    needs : by value reference, what `_needs` returns of each variable
+    needs : by value reference, the result of `_needs` for each variable
     """
     variable = entry.variable
     own = {
@@ -69,7 +69,7 @@ def _row(entry: TableEntry, needs: Mapping[int, frozenset[str]]) -> str:
 
 
 def _check(entry: TableEntry) -> str:
-    """Returns the check that a set of a variable asks for; of several elements the first one names it."""
+    """Returns the check of a variable's value; where elements are judged together, the first one has it."""
     variable = entry.variable
     if isinstance(variable, InputVariable) and variable.element == 0 and variable.kind.judge:
         return f"CHECK_{variable.kind.judge}"

@@ -1,1 +1,1 @@
-"""What importers see of an FMU: its variables, their description in XML, terminals and icons."""
+"""The interface of an FMU: variable table, modelDescription.xml, units, terminals and icons."""

@@ -1,4 +1,4 @@
-"""terminalsAndIcons.xml: which variables belong together in a connection, and the icons that stand for them.
+"""terminalsAndIcons.xml: terminals, groups of variables that are connected together, and their icons.
 
 FMI 3.0 defines the file; FMI 2.0.4 and later take it as it is.
 """
@@ -28,9 +28,12 @@ CONNECTION_COLOUR = "34 34 34"
 class Terminal:
     """Variables that are connected together.
 
-    kind    : what they are; a terminal of this kind of another model fits. It names the icon file too.
-    rule    : "plug" where all members are needed, "bus" where some do
-    prefix  : what the members' names leave out of the variables' names
+    name        : of the terminal
+    kind        : terminals of the same kind, of any models, can be connected; also the name of the icon file
+    rule        : "plug" where a connection needs all members, "bus" where some members are enough
+    description : for people
+    members     : its variables
+    prefix      : beginning of the variables' names that the members' names leave out
     """
 
     name: str
@@ -48,11 +51,11 @@ class Terminal:
 
 @dataclass(frozen=True)
 class Connection:
-    """What the inputs of one owner are together.
+    """Form of the terminal of an owner's inputs.
 
     kind        : of the terminal
-    description : of it; {owner}, {vessel} and, of a dock, {ports} are filled in
-    name        : of it
+    description : of the terminal, with places for {owner}, {vessel} and, of a dock, {ports}
+    name        : of the terminal, with the same places
     """
 
     kind: str
@@ -71,8 +74,8 @@ CONNECTIONS: dict[str, Connection | None] = {
     "vessel_torque": Connection("torque", "external torque on {owner}, its axes", "{owner}.torque"),
     "torque": Connection("torque", "external torque about the barycentre, body axes", "torque"),
 }
-"""Terminals of inputs by the key of `[inputs]`; None: no terminal. A key that is not here has one of its own
-kind."""
+"""By key of `[inputs]`, the form of the inputs' terminal; None: no terminal. Inputs of any other key have a
+terminal whose kind is the key."""
 
 
 def terminals(scene: Scene, entries: Sequence[TableEntry]) -> list[Terminal]:
@@ -93,7 +96,11 @@ def terminals(scene: Scene, entries: Sequence[TableEntry]) -> list[Terminal]:
 
 
 def _of_inputs(scene: Scene, key: str, owner: str, members: Sequence[TableEntry]) -> Terminal | None:
-    """Returns the terminal of an owner's inputs, None where such inputs have none."""
+    """Returns the terminal of an owner's inputs, None where inputs of that key have no terminal.
+
+    key, owner : of `[inputs]`, and the entry of its list
+    members    : the inputs
+    """
     generic = Connection(
         key, key.replace("_", " ") + (" of {owner}" if owner else ""), "{owner}." + key if owner else key
     )

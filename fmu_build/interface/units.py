@@ -12,10 +12,10 @@ from fmu_build.interface.variable_table import TableEntry
 class Unit:
     """A unit and the declared type of what is measured in it.
 
-    exponents : of the SI base units, in FMI's order
-    type_name : of the declared type
-    quantity  : what is measured
-    display   : a unit to show values in, and how many of it make one
+    exponents : by SI base unit, its exponent, in FMI's order
+    type_name : name of the declared type
+    quantity  : name of the physical quantity
+    display   : a unit for showing values, and the factor from this unit to that one
     """
 
     exponents: dict[str, int]

@@ -22,7 +22,11 @@ Kind = Literal["constant", "dependent"]
 
 @dataclass(frozen=True)
 class Dependency:
-    """What a variable depends on: a value reference, and how; "constant" is linear with a fixed factor."""
+    """A dependency of a variable on another one.
+
+    reference : value reference of the other variable
+    kind      : "constant" if the variable is linear in it with a fixed factor, else "dependent"
+    """
 
     reference: int
     kind: Kind
@@ -32,7 +36,9 @@ class Dependency:
 class TableEntry:
     """A variable of the FMU.
 
+    variable     : name, unit, start value and the like
     reference    : value reference, the variable's place in the table
+    role         : time, input, parameter, output, state or derivative
     nominal      : its magnitude, for an importer's solver
     dependencies : inputs and states that an output or a derivative depends on
     initial      : inputs and start parameters that an output, a state or a derivative depends on at the start
@@ -47,7 +53,7 @@ class TableEntry:
 
 
 Rows = dict[Role, list[tuple[Dependency, ...]]]
-"""Dependencies of each variable of a role."""
+"""By role, the dependencies of each variable of that role."""
 
 TIME = Variable("time", "s", "simulation time")
 

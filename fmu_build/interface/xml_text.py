@@ -1,4 +1,4 @@
-"""XML as the files of an FMU have it."""
+"""The text of an XML file of an FMU."""
 
 from xml.etree import ElementTree as ET
 

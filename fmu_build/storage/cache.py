@@ -58,7 +58,7 @@ UNUSED = 3600.0
 """Time without use [s] after which an older generation is removed; no compiler runs for half as long."""
 
 LARGEST_FILE = 64 << 20
-"""Size [bytes] that no file in the cache reaches; larger files are not read."""
+"""Size [bytes] that no kept result or library reaches; larger files are not read."""
 
 USED, FULL, LOCK = "used", "full", "lock"
 """Files in a generation. `used` has a byte for each compilation and the time of the last use; `full` exists
