@@ -55,9 +55,10 @@ ACTIONS: dict[str, Equation] = {
 
 
 def equation_of(kind: InputKind) -> Equation | None:
-    """Returns the equation of an input that acts; None: it is itself a torque about the barycentre, body axes.
+    """Returns the equation of an input that acts; None: it is itself a torque about the barycentre.
 
-    That is a kind of the whole assembly, in N m. Raises KeyError for another without an equation.
+    That is a kind of the whole assembly, in N m and body axes. Raises KeyError for another without an
+    equation.
     """
     if kind.key not in ACTIONS and (kind.owner or kind.unit != TORQUE.unit):
         raise KeyError(f"composite.actions.ACTIONS has no equation for inputs.{kind.key} [{kind.unit}]")
