@@ -9,6 +9,7 @@ import pytest
 
 from stability import truth
 from stability.truth import Case, Problem, Vector, mp
+from support.numbers import hamilton
 
 KEPT = mp.mpf(10) ** (
     1 - truth.DIGITS
@@ -40,12 +41,12 @@ def shortest(category: str, least: float) -> Case:
 
 def to_inertial(q: Any, v: Vector) -> Vector:
     unit = truth._unit([mp.mpf(x) for x in q])
-    return truth._times(truth._times(unit, [mp.zero, *v]), truth._conjugate(unit))[1:]
+    return hamilton(hamilton(unit, [mp.zero, *v]), truth._conjugate(unit))[1:]
 
 
 def gaps(case: Case, turn: Vector, omega: Vector) -> tuple[Any, Any]:
     """Returns how far a solution (turn from the start, rate) is from the one kept: angle, relative rate."""
-    end = truth._times(truth._unit([mp.mpf(x) for x in case.attitude]), turn)
+    end = hamilton(truth._unit([mp.mpf(x) for x in case.attitude]), turn)
     return truth.differences((list(case.attitude_end), list(case.omega_end)), (end, omega))
 
 
@@ -62,7 +63,7 @@ def extrapolated(case: Case, columns: int) -> tuple[Vector, Vector]:
         q, w = x[:4], x[4:]
         gyro = truth._cross(w, truth._apply(inertia, w))
         change = truth._apply(inverse, [m - g for m, g in zip(torque, gyro, strict=True)])
-        return [*(y / 2 for y in truth._times(q, [mp.zero, *w])), *change]
+        return [*(y / 2 for y in hamilton(q, [mp.zero, *w])), *change]
 
     state, parts = [mp.one, mp.zero, mp.zero, mp.zero, *omega], int(np.ceil(turned_at_most(case)))
     with mp.workdps(60):
@@ -185,7 +186,7 @@ def test_attitude_error_sees_the_sign_and_angles_below_rounding() -> None:
     q = truth._unit([mp.mpf(x) for x in (0.5, -0.1, 0.7, 0.3)])
     doubles = [float(x) for x in q]
     for angle in (1e-17, 1e-9, 1.0):
-        end = tuple(truth._times([mp.mpf(x) for x in doubles], truth._about(0, mp.mpf(angle))))
+        end = tuple(hamilton([mp.mpf(x) for x in doubles], truth._about(0, mp.mpf(angle))))
         assert truth.attitude_error(replace(sample(), attitude_end=end), doubles) == pytest.approx(angle)
     exact = replace(sample(), attitude_end=tuple(mp.mpf(x) for x in doubles))
     assert truth.attitude_error(exact, np.array(doubles)) == 0.0

@@ -60,9 +60,9 @@ ACTIONS: dict[str, Equation] = {
 
 
 def equation_of(kind: InputKind) -> Equation | None:
-    """Returns the equation of an input that acts; None for a torque about the barycentre in body axes.
+    """Returns the equation of an input that acts; None: it is itself a torque about the barycentre.
 
-    None is returned for a kind of the whole assembly, in N m. Raises KeyError for any other kind without an
+    That is a kind of the whole assembly, in N m and body axes. Raises KeyError for another without an
     equation.
     """
     if kind.key not in ACTIONS and (kind.owner or kind.unit != TORQUE.unit):
