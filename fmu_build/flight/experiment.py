@@ -1,4 +1,4 @@
-"""A scene's experiment as an importer flies it: steps, and the inputs that hold over each of them."""
+"""A scene's experiment as an importer flies it: communication steps, and inputs held over each of them."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -14,24 +14,26 @@ from supervessel.scene.schema import MOST_STEPS, Experiment, Scene
 Array = NDArray[np.float64]
 
 SLACK = 1e-9
-"""Of a step: so much nearer than a communication point counts as at it, for `k * step` is rounded."""
+"""Fraction of a step within which a time counts as a communication point, because `k * step` is rounded."""
 
 SAMPLES = 100
-"""Communication points up to each horizon at which a flight is looked at."""
+"""Number of communication points up to each horizon at which the state of a flight is recorded."""
 
 HORIZONS = (100.0, 10.0, 1.0)
-"""What the duration is divided by for the times up to which errors are given, each at the end of a step."""
+"""Divisors of the duration that give the times up to which errors are given, each at the end of a step."""
 
 
 @dataclass(frozen=True)
 class Course:
     """An experiment step by step.
 
-    duration        : of the whole [s]
-    size, last_size : communication step [s], and the last one, which may be shorter
-    numbers         : values over each step, (n,), of those inputs that move, by name
-    booleans        : the same of docks, 0 and 1
-    sampled         : numbers of steps after which the flight is looked at, ascending, n last
+    duration  : of the experiment [s]
+    size      : of a communication step [s]
+    last_size : of the last communication step, which may be shorter [s]
+    steps     : number of communication steps, n
+    numbers   : by the name of a moving input, its values over each step, (n,), in the input's unit
+    booleans  : by the name of a moving dock input, its values over each step, (n,), 0 and 1
+    sampled   : numbers of steps after which the state is recorded, ascending, n last
     """
 
     duration: float
@@ -54,7 +56,7 @@ class Course:
 
 
 def _ends(steps: int) -> list[int]:
-    """Returns the numbers of the steps after which errors are given, ascending."""
+    """Returns the numbers of the steps at whose ends the horizons are, ascending."""
     return sorted({ceil(steps / part - SLACK) for part in HORIZONS})
 
 
@@ -98,16 +100,20 @@ def course_of(scene: Scene) -> Course:
 
 
 def held(rows: Iterable[tuple[float, float]], times: Array, slack: float = 0.0) -> Array:
-    """Returns the last values at or before times, the first one before all; see `values`."""
+    """Returns the values at times [s], each held from its row to the next; the first one also before it.
+
+    rows, slack : as in `values`
+    """
     when, what = np.array(list(rows)).T
     place = np.searchsorted(when, times + slack, side="right") - 1
     return np.asarray(what[np.maximum(place, 0)], dtype=float)
 
 
 def values(rows: Iterable[tuple[float, float]], times: Array, slack: float = 0.0) -> Array:
-    """Returns values at times, linear between rows; of two rows at one time the second holds from then on.
+    """Returns the values at times [s], linear between rows and held before the first and after the last.
 
-    slack : [s], by which a time may be early and still counts as at a row
+    rows  : pairs of time [s] and value, in the order of time; of two at one time the second holds from it on
+    slack : [s], by which a time may be early and still count as the time of a row
     """
     when, what = np.array(list(rows)).T
     place = np.searchsorted(when, times + slack, side="right") - 1

@@ -1,4 +1,4 @@
-"""What the command `supervessel cache` says of the cache, and how it clears it."""
+"""The command `supervessel cache`: a report on the cache, and its removal."""
 
 import argparse
 import re
@@ -45,7 +45,7 @@ def cache(options: argparse.Namespace) -> int:
 
 
 def report() -> str:
-    """Returns where the cache is, why it is left unused if it is, and what is in it; makes nothing."""
+    """Returns the path of the cache, why it is left unused if so, and its generations; creates nothing."""
     _, base = base_folder()
     if base is None:
         return "no cache is kept: the user has no home, and SUPERVESSEL_CACHE is not set"
@@ -71,9 +71,9 @@ def report() -> str:
 
 
 def clear() -> str:
-    """Removes the cache, of whatever layout, and says what has gone and what has been left.
+    """Removes the caches of all layouts; returns what was removed and what was left, and why.
 
-    Raises BuildError where something could not be removed.
+    Raises BuildError if a part could not be removed.
     """
     _, base = base_folder()
     if base is None or not base.is_dir():
@@ -92,10 +92,10 @@ def clear() -> str:
 
 
 def _cleared(folder: Path) -> str:
-    """Removes a cache and says so, or why it has been left.
+    """Removes a cache; returns a line that says so, or why it was left.
 
-    It gets another name first: it is gone at once, whatever ends the removing, and what was judged is what
-    is removed.
+    The cache is renamed first: it is out of use at once even if the removal is interrupted, and nothing can
+    take the place of the folder that was judged.
     """
     try:
         trust(folder)
@@ -117,7 +117,7 @@ def _cleared(folder: Path) -> str:
 
 
 def _remove(folder: Path) -> None:
-    """Removes a folder that is on its way, its tag last."""
+    """Removes a renamed cache, its tag last."""
     for path in folder.iterdir():
         if path.name != TAG:
             remove(path)
@@ -127,7 +127,7 @@ def _remove(folder: Path) -> None:
 
 
 def _line(generation: Path) -> str:
-    """Returns a line about a generation."""
+    """Returns a line about a generation: its size and its last use."""
     if not is_own_folder(generation):
         return f"{generation.name}: no folder of the user's own, left alone"
     used = generation / USED
@@ -138,8 +138,8 @@ def _line(generation: Path) -> str:
 def _date(seconds: float) -> str:
     """Returns a date for reading, from seconds since 1970.
 
-    It is of the local time zone, of UTC where Python cannot use that; a date that Python does not know is
-    told in seconds.
+    It is in the local time zone, or in UTC if Python cannot use that; a date that Python cannot represent is
+    given in seconds.
     """
     for zone in (None, UTC):
         with suppress(ValueError, OverflowError, OSError):

@@ -1,6 +1,6 @@
-"""Temporary folders that are gone when their work is done, or when a later run comes, if it was killed.
+"""Temporary folders, removed when their work is done. A later run removes those that killed processes left.
 
-Each holds a file that its process keeps locked: where the lock is free, the process has ended.
+Each folder holds a file that its process keeps locked: if the lock is free, the process has ended.
 """
 
 import atexit
@@ -24,17 +24,17 @@ PREFIX = "supervessel-"
 LOCK = ".supervessel-lock"
 
 SIGNATURE = b"supervessel: this folder is removed when the process that has locked this file has ended\n"
-"""Written once the file is locked: a file without it is being made at this moment."""
+"""Content of the lock file, written once the file is locked; a folder whose file lacks it is being made."""
 
 LOCKED_BYTE = 1024
-"""Where the lock is: Windows keeps others from reading what is locked."""
+"""Offset of the locked byte, behind the content: on Windows others cannot read locked bytes."""
 
 
 @contextmanager
 def temporary_folder() -> Iterator[Path]:
     """Yields a folder in the system's folder for temporary files, removed afterwards.
 
-    What runs that were killed have left there is removed first, once in a program. Raises OSError where no
+    Folders that killed processes have left there are removed first, once in a program. Raises OSError if no
     folder can be made.
     """
     clear_left(tempfile.gettempdir())
@@ -54,7 +54,7 @@ def temporary_folder() -> Iterator[Path]:
 
 
 def place_for_temporary() -> str:
-    """Returns the folder for temporary files as messages name it; where none can be used, its variable."""
+    """Returns, for a message, the folder for temporary files; where none can be used, the name TMPDIR."""
     with suppress(OSError):
         return tempfile.gettempdir()
     return "TMPDIR"
@@ -70,10 +70,10 @@ def folder_of_program() -> Path:
 
 @functools.cache
 def clear_left(place: str) -> None:
-    """Removes the folders in a place that runs of this user's have left that were killed.
+    """Removes the folders in `place` that killed processes of this user have left.
 
-    Only real folders with the lock's file in them, written as `temporary_folder` does and locked by nobody;
-    and nothing that is reached by a link.
+    A folder is removed only if it is no link and its lock file is as `temporary_folder` writes it and not
+    locked.
     """
     with suppress(OSError), os.scandir(place) as entries:
         for entry in entries:
@@ -83,7 +83,7 @@ def clear_left(place: str) -> None:
 
 
 def _clear(folder: Path) -> None:
-    """Removes a folder if it is left over. Raises OSError where that cannot be found out."""
+    """Removes a folder if a killed process has left it. Raises OSError if that cannot be found out."""
     if not is_own_folder(folder):
         return
     held = os.open(folder / LOCK, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
@@ -109,14 +109,14 @@ def is_own_folder(path: Path) -> bool:
 
 
 def is_own(status: os.stat_result) -> bool:
-    """Whether something belongs to the user; Windows does not say, there all does."""
+    """Whether a file with this status belongs to the user; on Windows always true, as it does not tell."""
     return os.name != "posix" or status.st_uid == os.geteuid()
 
 
 def lock(file: int, *, shared: bool = False) -> bool:
-    """Locks a file until it is closed, or its process ends; returns whether nobody else has locked it.
+    """Locks a file until it is closed or the process ends; returns False if another process has locked it.
 
-    shared : others may lock it so at the same time (on Windows nobody else may)
+    shared : whether others may have a shared lock at the same time (on Windows they may not)
     """
     try:
         if sys.platform == "win32":

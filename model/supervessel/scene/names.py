@@ -1,6 +1,6 @@
-"""Names in a scene: that they exist, that they are written right, and that the docks make one tree.
+"""Problems of names in a scene: unknown or ill-formed names, and docks that do not make one tree of vessels.
 
-Works on the raw tables of a file, so that a wrong name is reported beside a wrong number.
+The raw tables of a file are checked, so that a wrong name is reported beside a wrong number.
 """
 
 import re
@@ -15,18 +15,18 @@ from supervessel.scene.outputs import OUTPUTS, VESSEL_OUTPUTS
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 MODEL_NAME = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*_?")
 LONGEST_NAME = 100
-"""Letters of a name: what file systems, linkers and archives take, with room for what stands around it."""
+"""Most letters of a name: file systems, linkers and archives take it with a prefix and a suffix."""
 DEVICE = re.compile(r"(con|prn|aux|nul|(com|lpt)[0-9])", re.IGNORECASE)
-"""Names that Windows keeps for devices, with any extension: no file can have one."""
+"""Names that Windows keeps for devices, with any extension: no file can be called so."""
 
 MOST_VESSELS = 2000
 MOST_MOVING = 1000
 MOST_LISTED = 2000
-"""Vessels, inputs that move or close docks, and names in another list of inputs that a scene may have: what
-is read in seconds."""
+"""Most vessels of a scene, most inputs that move or close docks, most names in any other list of inputs: a
+scene within these limits is read in seconds."""
 
 Ports = Mapping[str, Collection[str]]
-"""Names of the ports, or points, of each vessel."""
+"""By vessel, the names of its ports, or of its points."""
 
 RESERVED = frozenset(
     (
@@ -40,7 +40,7 @@ RESERVED = frozenset(
         "attitude_start",
     )
 )
-"""Names of the FMU's own variables, and those it will have: no vessel or port can take them."""
+"""Names of the FMU's own variables, present and planned: no vessel or port can be called so."""
 
 
 def size_problems(raw: Mapping[str, Any]) -> Iterator[str]:
@@ -82,7 +82,7 @@ def _list(raw: Any, key: str) -> list[Any]:
 
 
 def _named(raw: Any, key: str) -> dict[str, None]:
-    """Returns the names in a list, each once, in their order."""
+    """Returns the names in the list under a key, each once, in their order."""
     return dict.fromkeys(name for name in _list(raw, key) if isinstance(name, str))
 
 
@@ -99,7 +99,7 @@ def _parts(raw: Mapping[str, Any], key: str) -> Ports:
 
 
 def _dock_names(raw: Mapping[str, Any]) -> dict[int, str]:
-    """Returns the names of those docks that have one, by number from 1."""
+    """Returns, by number from 1, the names of the docks that have a name."""
     docks = enumerate(_list(raw, "docks"), start=1)
     names = {i: dock.get("name") for i, dock in docks if isinstance(dock, Mapping)}
     return {i: name for i, name in names.items() if isinstance(name, str)}
@@ -169,8 +169,8 @@ def _port_problem(name: object, ports: Ports, kind: str = "port") -> str:
 
 
 def _docks(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
-    """Yields what keeps the docks closed at the start from making a forest, and all of them from reaching
-    every vessel from the root."""
+    """Yields problems of the docks: the docks closed at the start must make no loop, and all docks together
+    must connect every vessel with the root."""
     switched = _named(_table(raw, "inputs"), "docked")
     closed, reached = ({vessel: {vessel} for vessel in ports} for _ in range(2))
     taken: dict[str, str] = {}
@@ -271,7 +271,7 @@ def _inputs(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
 
 
 def misnamed_courses(raw: Mapping[str, Any]) -> dict[str, str]:
-    """Returns what is wrong with names in experiment.inputs, by name; what stands there is not looked at."""
+    """Returns, by name, what is wrong with a name in experiment.inputs; the values are not checked here."""
     groups = by_group(_table(raw, "inputs"))
     known = dict.fromkeys(one for _, names in groups.values() for one in names)
     problems = {}
@@ -290,7 +290,7 @@ def misnamed_courses(raw: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _quoted(name: str, table: Mapping[str, Any]) -> str:
-    """Returns the keys of a table as the names that they were meant to be part of."""
+    """Returns, for a message, the names in quotes that the keys of a table were meant to be part of."""
     return listed((f'"{name}.{key}"' for key in table), len(table))
 
 
