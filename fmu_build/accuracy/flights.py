@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from fmu_build.accuracy.histories import Body, Histories
 from fmu_build.flight.choices import Choice
+from fmu_build.flight.distance import attitude_apart
 from fmu_build.flight.flying import OUT_OF_TIME, InputCourses, job_of, run_host
 from fmu_build.flight.workshop import AT_ONCE, Workshop, build_all, source_of
-from fmu_build.trade.study import attitude_apart
 from supervessel.composite.resolved import resolve
 from supervessel.equations import Equations
 from supervessel.problems import AccuracyError

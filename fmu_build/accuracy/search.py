@@ -23,9 +23,9 @@ from fmu_build.flight.choices import (
     variant_of,
     while_free,
 )
+from fmu_build.flight.distance import HALF_ULP
 from fmu_build.flight.results import are_numbers, keep, place_of, read
 from fmu_build.flight.workshop import Workshop, build_all, source_of
-from fmu_build.trade.study import HALF_ULP
 from supervessel.equations import Equations, equations
 from supervessel.problems import AccuracyError
 from supervessel.scene.schema import Accuracy, Scene

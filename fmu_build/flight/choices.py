@@ -101,6 +101,28 @@ def reference_choices(scene: Scene, model: Model) -> tuple[Choice, Choice]:
     )
 
 
+def is_free(scene: Scene, model: Model) -> bool:
+    """Whether a model's motion is free all through the experiment: nothing acts and nothing else changes."""
+    known = by_name(dict(scene.inputs))
+    moved = [
+        known[name].change
+        for name, rows in experiment_of(scene).inputs.items()
+        if len({value for _, value in rows}) > 1
+    ]
+    frozen = all(change != "" and change == model.frozen for change in moved)
+    return frozen and not acts(scene) and not scene.inputs.motion
+
+
+def ways_to(scene: Scene, model: Model) -> list[Choice]:
+    """Returns ways to a model's motion in an experiment, the most exact first.
+
+    Where the motion is free that is `exact`: an unstable motion enlarges what each step leaves, which
+    `reference_choices` take and it does not.
+    """
+    free = [Choice(model, name) for name in always_free()] if is_free(scene, model) else []
+    return [*free, *reference_choices(scene, model)]
+
+
 def by_tolerance(scene: Scene, model: Model, *, quick: bool) -> Iterator[Choice]:
     """Yields what is tried of a model besides rk4."""
     tolerances = QUICK_TOLERANCES if quick else TOLERANCES

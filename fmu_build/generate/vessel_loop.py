@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from supervessel.composite.anchors import from_anchor
 from supervessel.composite.chain import kernels
 from supervessel.composite.constants import seen_in_group
 from supervessel.composite.docks import Joint
@@ -14,6 +15,7 @@ from supervessel.composite.inertia import UPPER_TRIANGLE
 from supervessel.composite.poses import scaled
 from supervessel.composite.resolved import ResolvedScene, RigidGroup
 from supervessel.equations import Equations
+from supervessel.scene.inputs import vessel_of
 
 LONGEST_CODE = 2000
 """Instructions of a composite beyond which a loop is faster, and compiled in seconds instead of minutes."""
@@ -164,7 +166,8 @@ def _port(loop: LoopScene, name: str, tables: LoopTables) -> str:
     if name in scene.inputs.pose:
         return _input(loop.inputs[f"{name}.position[1]"])
     port = scene.port(name)
-    return _constant(tables.hold(port.position, scaled(port.direction), scaled(port.alignment)))
+    position = from_anchor(scene, vessel_of(name), port.position)
+    return _constant(tables.hold(position, scaled(port.direction), scaled(port.alignment)))
 
 
 def _input(place: int) -> str:
@@ -198,7 +201,7 @@ def _varying_body(loop: LoopScene, frame: int, group: RigidGroup, name: str, tab
     free = name in loop.resolved.scene.inputs.pmi
     moments = _input(inputs[f"{name}.pmi[1]"]) if free else NOWHERE
     centre, specific = loop.seen[name]
-    own_axes = frame > 0 and name == group.reference and not any(vessel.centre_of_mass)
+    own_axes = frame > 0 and name == group.reference and not any(centre)
     if own_axes and free:
         return BodyRow("BODY_DIAGONAL_FREE", frame, mass, moments=moments)
     if own_axes and vessel.pmi is not None:

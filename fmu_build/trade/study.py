@@ -3,7 +3,7 @@
 import json
 import platform
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -19,18 +19,22 @@ from fmu_build.flight.choices import (
     by_tolerance,
     label,
     models,
-    reference_choices,
+    ways_to,
 )
+from fmu_build.flight.distance import HALF_ULP, attitude_apart
 from fmu_build.flight.experiment import SLACK, Course, course_of, experiment_of
 from fmu_build.flight.flying import Flown, fly_all
 from fmu_build.flight.results import BUILT_WITH
 from fmu_build.flight.workshop import Workshop, builds, workshop
 from fmu_build.storage.cache import LARGEST_FILE
+from fmu_build.trade.ranking import counted, ranks
 from supervessel.problems import TradeError
 from supervessel.scene.schema import Scene, without_accuracy
 
 Array = NDArray[np.float64]
-HALF_ULP = 2.0**-53
+COSTS = ("ns_per_step", "rk4_steps_per_step", "us_per_second", "operations", "bytes")
+"""What of a row costs."""
+
 Progress = Callable[[int, int, str], None]
 """Told how many of how many parts are done, and the latest one."""
 
@@ -42,7 +46,8 @@ ABOUT = {
     "experiment": "flown: duration [s], communication step [s], inputs as rows of time [s] and value",
     "steps": "communication steps of the experiment",
     "horizons": "times [s] up to which errors in lists are the largest; single errors are over the whole",
-    "doubt": "how far two ways to the best model's motion are apart: smaller errors cannot be told",
+    "doubt": "how far two ways to a model's motion are apart; first that of the best model. Smaller errors "
+    "of integration against the former, smaller whole errors against the latter cannot be told",
     "models": "laws, and what each leaves out: its exact motion against the best model's, the last one",
     "choices": "models with a propagator and its settings: errors and costs",
     "refused": "choices that could not be flown",
@@ -51,8 +56,9 @@ ABOUT = {
     "same": "models with the same motion to the last bit",
     "attitude": "error [rad]: angle between the attitude and that of the law tensor with all inputs moving",
     "rate": "error [rad/s]: length of the difference of the angular velocities, likewise",
-    "integration_attitude": "error [rad] against the exact motion of the same model",
+    "integration_attitude": "error [rad] against the exact motion of the same model; 0 of the way to it",
     "integration_rate": "error [rad/s] against the exact motion of the same model",
+    "way": "by which a model's exact motion is found: where it is free exact, else series or stages at 1e-15",
     "propagator": "[rotation] propagator",
     "setting": 'what its settings are: "max_angle_step" [rad], "tolerance" [1], "" where it has none',
     "settings": "values of that; all of them move the same to the last bit",
@@ -60,6 +66,8 @@ ABOUT = {
     "ns_per_step": "time [ns] of a communication step: inputs set, step, attitude and rate got",
     "rk4_steps_per_step": "that over the time of a plain RK4 step, timed in turn",
     "us_per_second": "time [us] that a second of motion takes",
+    "operations": "products and sums of a communication step, counted, on an average: they tell which of two "
+    "choices is cheaper whose times are less than 10 % apart",
     "bytes": "size of the library",
     "pareto": "whether no other choice is as good in both error of the attitude and cost, and better in one",
     "choice": "model, propagator and setting",
@@ -78,10 +86,18 @@ class Errors:
 
 @dataclass(frozen=True)
 class _Reference:
-    """A model's own motion: samples (n, 7), and how far two ways to it are apart."""
+    """A model's own motion.
 
+    way     : the most exact one to it
+    samples : (n, 7), by that way
+    doubt   : how far a second way is apart
+    stepped : samples by the way that every model has; none where it was refused
+    """
+
+    way: Choice
     samples: Array
     doubt: Errors
+    stepped: Array
 
 
 def study(scene: Scene, *, quick: bool = False, progress: Progress = lambda *_: None) -> dict[str, Any]:
@@ -102,9 +118,10 @@ def study(scene: Scene, *, quick: bool = False, progress: Progress = lambda *_: 
         same = _same([model for model in tried if model in references], references)
         kept = list(same)
         flown = _ladders(scene, kept, count, quick=quick)
-    best = references[BEST]
+    best, operations = references[BEST], counted(scene, course)
     rows = [
         _row(choice, result, course, references[choice.model].samples, best.samples)
+        | {"operations": operations(choice, result)}
         for choice, result in flown.items()
         if result.refused is None
     ]
@@ -130,6 +147,8 @@ def study(scene: Scene, *, quick: bool = False, progress: Progress = lambda *_: 
                 "law": model.law,
                 "frozen": model.frozen,
                 "same": [str(other) for other in same[model]],
+                "way": str(references[model].way),
+                "doubt": _lists(references[model].doubt),
                 **_lists(errors(references[model].samples, best.samples, course)),
             }
             for model in kept
@@ -178,23 +197,23 @@ def _references(
     scene: Scene, tried: Sequence[Model], course: Course, count: _Count
 ) -> tuple[dict[Model, _Reference], dict[Choice, Flown]]:
     """Returns each model's own motion, and those without; the best model, flown first, must have one."""
-    pairs = {model: reference_choices(scene, model) for model in tried}
-    flown = count.fly(scene, pairs[BEST])
-    for result in flown.values():
-        if result.refused is not None:
-            raise TradeError(f"experiment: the scene cannot run it: {result.refused}")
-    flown |= count.fly(scene, [choice for model in tried if model != BEST for choice in pairs[model]])
+    ways = {model: ways_to(scene, model) for model in tried}
+    flown = count.fly(scene, ways[BEST])
+    reasons = [result.refused for result in flown.values() if result.refused is not None]
+    if len(reasons) > len(flown) - 2:
+        raise TradeError(f"experiment: the scene cannot run it: {reasons[0]}")
+    flown |= count.fly(scene, [choice for model in tried if model != BEST for choice in ways[model]])
     references: dict[Model, _Reference] = {}
     refused: dict[Choice, Flown] = {}
-    for model, pair in pairs.items():
-        one, other = (flown[choice] for choice in pair)
-        reason = one.refused or other.refused
-        if reason is not None:
-            refused[pair[0] if one.refused else pair[1]] = replace(one, refused=reason)
-        else:
-            references[model] = _Reference(
-                one.samples, _doubt(errors(other.samples, one.samples, course), one)
-            )
+    for model, choices in ways.items():
+        followed = [choice for choice in choices if flown[choice].refused is None]
+        if len(followed) < 2:
+            choice = next(choice for choice in choices if choice not in followed)
+            refused[choice] = flown[choice]
+            continue
+        one, other = (flown[choice] for choice in followed[:2])
+        doubt = _doubt(errors(other.samples, one.samples, course), one)
+        references[model] = _Reference(followed[0], one.samples, doubt, flown[choices[-2]].samples)
     return references, refused
 
 
@@ -211,8 +230,9 @@ def _same(tried: Sequence[Model], references: dict[Model, _Reference]) -> dict[M
     """
     kept: dict[Model, list[Model]] = {}
     for model in tried:
-        samples = references[model].samples
-        twin = next((k for k in kept if np.array_equal(references[k].samples, samples)), None)
+        samples = references[model].stepped
+        alike = (k for k in kept if len(samples) and np.array_equal(references[k].stepped, samples))
+        twin = next(alike, None)
         if twin is None or model == BEST:
             kept[model] = []
         else:
@@ -267,10 +287,10 @@ def _merged(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         if key in merged:
             first = merged[key]
             settings = [*first["settings"], *row["settings"]]
-            cheaper = row if row["rk4_steps_per_step"] < first["rk4_steps_per_step"] else first
+            cheaper = min(first, row, key=lambda one: (one["operations"], one["rk4_steps_per_step"]))
             merged[key] = first | {
                 "settings": settings,
-                **{k: cheaper[k] for k in ("ns_per_step", "rk4_steps_per_step", "us_per_second", "bytes")},
+                **{k: cheaper[k] for k in COSTS},
             }
         else:
             merged[key] = row
@@ -278,14 +298,11 @@ def _merged(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _mark_front(rows: Sequence[dict[str, Any]], doubt: float) -> None:
-    """Marks the rows that no other beats in error and cost; errors below the references' doubt are equal."""
-    for row in rows:
-        mine = max(row["attitude"], doubt), row["rk4_steps_per_step"]
+    """Marks the rows that no other beats in error and cost; errors below the best model's doubt are equal."""
+    points = [(max(row["attitude"], doubt), rank) for row, rank in zip(rows, ranks(rows), strict=True)]
+    for row, (error, rank) in zip(rows, points, strict=True):
         row["pareto"] = not any(
-            (max(other["attitude"], doubt), other["rk4_steps_per_step"]) != mine
-            and max(other["attitude"], doubt) <= mine[0]
-            and other["rk4_steps_per_step"] <= mine[1]
-            for other in rows
+            other != (error, rank) and other[0] <= error and other[1] <= rank for other in points
         )
 
 
@@ -297,18 +314,6 @@ def errors(samples: Array, truth: Array, course: Course) -> Errors:
         np.searchsorted(course.times, horizon + SLACK * course.size, "right") for horizon in course.horizons
     ]
     return Errors(*(np.array([x[: max(end, 1)].max() for end in ends]) for x in (turned, off)))
-
-
-def attitude_apart(one: Array, other: Array) -> Array:
-    """Returns the angles [rad], (n,), between attitudes, (n, 4) each; q and -q are the same.
-
-    From the vector part of the turn between them: an angle of 1e-16 shows.
-    """
-    w, v = one[:, 0], one[:, 1:]
-    a, b = other[:, 0], other[:, 1:]
-    vector = w[:, None] * b - a[:, None] * v - np.cross(v, b)
-    scalar = np.abs(w * a + np.sum(v * b, axis=1))
-    return np.asarray(2.0 * np.arctan2(np.linalg.norm(vector, axis=1), scalar))
 
 
 def _lists(found: Errors) -> dict[str, list[float]]:

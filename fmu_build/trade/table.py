@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fmu_build.flight.choices import label
+from fmu_build.trade.ranking import ranks
 
 ENOUGH = 1e-9
 """Integration error [rad] from which on a model's cheapest choice is quoted."""
@@ -18,8 +19,9 @@ def table(trade: Mapping[str, Any]) -> str:
     ]
     refused = [f"{one['choice']}: refused {one['reason']}" for one in trade["refused"]]
     notes = [
-        f"Two references of the best model are {_brief(trade['doubt']['attitude'][-1])} rad and "
-        f"{_brief(trade['doubt']['rate'][-1])} rad/s apart: less than that is not told.",
+        "A model is known to what two ways to its motion are apart: smaller errors of its integration are "
+        f"not told, nor whole errors below {_brief(trade['doubt']['attitude'][-1])} rad and "
+        f"{_brief(trade['doubt']['rate'][-1])} rad/s, which the best model is known to.",
         *same,
         *refused,
     ]
@@ -35,19 +37,29 @@ def table(trade: Mapping[str, Any]) -> str:
 def drift_table(trade: Mapping[str, Any]) -> str:
     """Returns how far each model has turned away from the best one by each horizon, and what it costs.
 
-    The cost is that of the cheapest choice whose integration error is at most ENOUGH, or of the most exact.
+    Known to: how far two ways to its own motion are apart; what two models are known to adds up in how far
+    they are off each other. The cost is that of `_cheapest`.
     """
     horizons = [f"{horizon:g} s" for horizon in trade["horizons"]]
     lines = _heading(
-        ["model", *(f"off by [rad] after {h}" for h in horizons), "cheapest", "us per s", "plain RK4 steps"],
+        [
+            "model",
+            *(f"off by [rad] after {h}" for h in horizons),
+            "known to [rad]",
+            "cheapest",
+            "us per s",
+            "plain RK4 steps",
+        ],
         1,
     )
     best = trade["models"][-1]
     for model in trade["models"]:
         cheapest = _cheapest(model, trade["choices"])
         off = [
-            "-" if model is best else _brief(x, doubt)
-            for x, doubt in zip(model["attitude"], trade["doubt"]["attitude"], strict=True)
+            "-" if model is best else _brief(x, doubt + own)
+            for x, doubt, own in zip(
+                model["attitude"], trade["doubt"]["attitude"], model["doubt"]["attitude"], strict=True
+            )
         ]
         cost = ["-", "-", "-"]
         if cheapest is not None:
@@ -56,16 +68,25 @@ def drift_table(trade: Mapping[str, Any]) -> str:
                 f"{cheapest['us_per_second']:.3g}",
                 f"{cheapest['rk4_steps_per_step']:.2g}",
             ]
-        lines.append(_line([label(model), *off, *cost]))
+        known = _brief(model["doubt"]["attitude"][-1])
+        lines.append(_line([label(model), *off, known, *cost]))
     return "\n".join(lines)
 
 
 def _cheapest(model: Mapping[str, Any], choices: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
-    own = [row for row in choices if label(row) == label(model)]
-    enough = [row for row in own if row["integration_attitude"] <= ENOUGH]
-    if enough:
-        return min(enough, key=lambda row: float(row["rk4_steps_per_step"]))
-    return min(own, key=lambda row: float(row["integration_attitude"]), default=None)
+    """Returns the cheapest choice of a model whose integration error is at most ENOUGH.
+
+    Where there is none, the cheapest of those whose error is below the model's doubt, which cannot be told
+    apart; and where there is none either the most exact. None where nothing was flown.
+    """
+    own = [
+        (rank, row) for rank, row in zip(ranks(choices), choices, strict=True) if label(row) == label(model)
+    ]
+    for limit in (ENOUGH, model["doubt"]["attitude"][-1]):
+        enough = [one for one in own if one[1]["integration_attitude"] <= limit]
+        if enough:
+            return min(enough, key=lambda one: one[0])[1]
+    return min((row for _, row in own), key=lambda row: float(row["integration_attitude"]), default=None)
 
 
 def choices_table(trade: Mapping[str, Any]) -> str:
@@ -87,6 +108,7 @@ def choices_table(trade: Mapping[str, Any]) -> str:
         ],
         2,
     )
+    own = {label(model): model["doubt"] for model in trade["models"]}
     for row in trade["choices"]:
         lines.append(
             _line(
@@ -94,9 +116,9 @@ def choices_table(trade: Mapping[str, Any]) -> str:
                     label(row),
                     _name(row),
                     *(
-                        _brief(row[f"{part}{key}"], trade["doubt"][key][-1])
+                        _brief(row[f"{part}{key}"], doubt[key][-1])
                         for key in ("attitude", "rate")
-                        for part in ("", "integration_")
+                        for part, doubt in (("", trade["doubt"]), ("integration_", own[label(row)]))
                     ),
                     f"{row['sub_steps'] / trade['steps']:.3g}",
                     f"{row['ns_per_step']:.0f}",

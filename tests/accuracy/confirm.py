@@ -17,7 +17,7 @@ from fmpy.fmi3 import FMU3Slave
 from scipy.integrate import solve_ivp
 
 from fmu_build import BuildError, build_fmu
-from fmu_build.trade.study import attitude_apart
+from fmu_build.flight.distance import attitude_apart
 from supervessel import Scene, parse_scene, reference
 from supervessel.composite.resolved import resolve
 

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from fmu_build.flight.choices import BEST, Choice, label
+from fmu_build.flight.choices import BEST, Choice, Model, label
 from fmu_build.flight.experiment import course_of
 from fmu_build.flight.flying import fly_all
-from fmu_build.trade import TradeError, plot, study, table
+from fmu_build.trade import TradeError, drift_table, plot, study, table
+from fmu_build.trade.ranking import SAME_TIME, ranks
+from fmu_build.trade.study import errors
 from supervessel import parse_scene, reference
 from support import U, variant
 from support.processes import kept_in
@@ -38,6 +40,28 @@ BODY: dict[str, Any] = {
 STEADY = variant(
     BODY, {"inputs.mass": [], "experiment.inputs": {"torque[1]": BODY["experiment"]["inputs"]["torque[1]"]}}
 )
+
+
+TUMBLING = variant(
+    BODY,
+    {
+        "vessels.B": {"mass": 2.0, "pmi": [1.0, 2.0, 2.9]},
+        "inputs": {"pmi": ["B"]},
+        "rotation": {"angular_velocity": [1e-6, 1.0, 0.0]},
+        "experiment": {
+            "duration": 90.0,
+            "step": 0.5,
+            "inputs": {"B.pmi[2]": [[0.0, 2.0], [10.0, 2.0], [11.0, 2.8]]},
+        },
+    },
+)
+"""A spin about the middle axis; with the moments left at their start it turns over again and again."""
+
+
+@pytest.fixture(scope="module")
+def tumbling() -> dict[str, Any]:
+    """The quick trade of the body that tumbles."""
+    return study(parse_scene(TUMBLING), quick=True)
 
 
 @pytest.fixture(scope="module")
@@ -130,9 +154,82 @@ def test_tolerances_are_kept_step_by_step(trade):
         assert row["integration_attitude"] <= 160.0 * tightest + 32.0 * U, row
 
 
+@pytest.mark.parametrize("law", ["principal", "tensor"])
+def test_an_unstable_motion_without_torque_is_found_in_closed_form(tumbling, law, shop):
+    """Beside 60 digits: what steps leave grows with each turn-over, what starts once is off by 1e-12."""
+    [model] = [m for m in tumbling["models"] if (m["law"], m["frozen"]) == (law, "mass")] or [None]
+    if model is None:
+        [first] = [m for m in tumbling["models"] if m["frozen"] == "mass"]
+        assert f"{law}, mass frozen" in first["same"]
+        return
+    scene = parse_scene(TUMBLING)
+    rows = [r for r in tumbling["choices"] if (r["law"], r["frozen"]) == (law, "mass")]
+    state = [mp.mpf(x) for x in (1.0, 0.0, 0.0, 0.0, 1e-6, 1.0, 0.0)]
+    truth = []
+    for _ in range(180):
+        state = flight("tensor", np.diag([2.0, 4.0, 5.8]), state, [0.0] * 3, 0.5, digits=60)
+        truth.append([float(x) for x in state])
+    course, taylor = course_of(scene), Choice(Model(law, "mass"), "taylor", None, 1e-15)
+    samples = fly_all(scene, [taylor], shop)[taylor].samples
+    sampled = np.array(truth)[course.sampled - 1]
+    stepped = float(errors(samples, sampled, course).attitude[-1])
+    assert stepped > 1e-9
+    assert model["way"] == f"{law}, mass frozen, exact"
+    assert model["doubt"]["attitude"][-1] == pytest.approx(stepped, rel=1e-2)
+    exact = Choice(Model(law, "mass"), "exact")
+    closed = errors(fly_all(scene, [exact], shop)[exact].samples, sampled, course)
+    assert float(closed.attitude[-1]) <= 1e-11
+    for row in rows:
+        if row["propagator"] in ("exact", "auto"):
+            assert row["integration_attitude"] <= 1e-11
+    [line] = [x for x in drift_table(tumbling).splitlines() if x.startswith(f"| {model['law']}, mass frozen")]
+    assert "`exact`" in line or "`auto`" in line
+    assert f"| {stepped:.1e} |" in line
+    assert f"< {stepped:.0e}" in table(tumbling)
+
+
+def test_errors_of_integration_below_a_models_own_doubt_are_not_told(tumbling):
+    text = table(tumbling).split("| model | propagator |")[1]
+    for model in tumbling["models"]:
+        doubt = model["doubt"]["attitude"][-1]
+        own = [line for line in text.splitlines() if line.startswith(f"| {label(model)} |")]
+        assert own
+        for line in own:
+            told = line.split("|")[4].strip()
+            assert told.startswith("<") or float(told) >= 0.95 * doubt
+
+
+def test_times_that_are_not_told_apart_are_ranked_by_operations():
+    def row(time: float, operations: float) -> dict[str, float]:
+        return {"rk4_steps_per_step": time, "operations": operations}
+
+    rows = [
+        row(1.05, 100.0),
+        row(1.0, 200.0),
+        row(1.04, 300.0),
+        row(0.999 * SAME_TIME**2, 50.0),
+        row(0.5, 900.0),
+    ]
+    order = sorted(range(5), key=ranks(rows).__getitem__)
+    assert order == [4, 0, 1, 2, 3]
+    assert ranks([]) == []
+
+
+def test_operations_are_those_that_an_accuracy_is_chosen_by(trade):
+    """The same equations, so a finer step of rk4 costs as much more as it has sub-steps."""
+    for law in ("principal", "tensor"):
+        rows = [r for r in trade["choices"] if (r["law"], r["propagator"]) == (law, "rk4")]
+        assert len({round(r["operations"] / r["sub_steps"], 9) for r in rows}) == 1
+    of = {r["law"]: r["operations"] for r in trade["choices"] if r["propagator"] == "rk4"}
+    assert of["principal"] < of["tensor"]
+
+
 def test_the_front_is_what_nothing_beats(trade):
     doubt = trade["doubt"]["attitude"][-1]
-    points = [(max(r["attitude"], doubt), r["rk4_steps_per_step"]) for r in trade["choices"]]
+    points = [
+        (max(r["attitude"], doubt), rank)
+        for r, rank in zip(trade["choices"], ranks(trade["choices"]), strict=True)
+    ]
     for row, (error, cost) in zip(trade["choices"], points, strict=True):
         beaten = any(e <= error and c <= cost and (e < error or c < cost) for e, c in points)
         assert row["pareto"] is not beaten

@@ -9,7 +9,7 @@ import pytest
 
 from supervessel import Twin
 from supervessel.rotation.propagators.free_motion import FIRST_ANGLE, LARGEST_TURN
-from support import ISS_DG, OK, PROPAGATORS, Array, U, body, flying, random_rotation, scene, variant
+from support import ISS_DG, OK, PROPAGATORS, Array, U, body, flying, random_rotation, scene, series, variant
 from twin.scenes import numbers
 
 RATES = [0.05, -0.08, 0.11]
@@ -159,6 +159,33 @@ def test_free_motion_of_too_many_turns_is_nan(pmi, doublings, propagator):
     for h, followed in ((0.999, True), (-0.999, True), (1.001, False), (-1.001, False), (1e200, False)):
         x_next = numbers(twin.step(twin.x_start, [0.0] * 3, twin.p_start, h * reach))
         assert np.isfinite(x_next).all() if followed else np.isnan(x_next).all()
+
+
+@pytest.mark.parametrize(
+    ("way", "count", "h"), [("rollout", 5000, 0.04), ("fold", 20000, 0.01), ("FMU", 5000, 0.04)]
+)
+def test_many_steps_of_free_motion_end_where_one_does(way, count, h):
+    """Over 180 rad. From one start 8 u (1 + angle); each rate u off, 0.6 u count^1.5 angle of a step.
+
+    The latter for steps below 1/32 rad, which find the change of the rate by itself; else it is some 8 u off.
+    """
+    raw = body(1000.0, (1.0, 1.2, 1.5), propagator="exact", angular_velocity=[0.3, 0.7, 0.5])
+    raw = variant(raw, {"inputs": {"mass": ["B"], "torque": False}})
+    twin = Twin(scene(raw))
+    if way == "rollout":
+        end = numbers(twin.rollout(count)(x=twin.x_start, h=h)["x_next"][:, -1])
+    elif way == "fold":
+        end = numbers(twin.step.fold(count)(x=twin.x_start, h=h)["x_next"])
+    else:
+        with flying(raw) as fmu:
+            for _ in range(count):
+                assert fmu.step(h) == OK
+            end = np.concatenate([fmu.get("state.attitude"), fmu.get("state.angular_velocity")])
+    truth = series.flight("tensor", np.diag([1000.0, 1200.0, 1500.0]), twin.x_start, np.zeros(3), count * h)
+    rate = float(np.linalg.norm(twin.x_start[4:]))
+    off = [abs(float(series.mp.mpf(float(a)) - b)) for a, b in zip(end, truth, strict=True)]
+    limit = 0.6 * U * count**1.5 * rate * h if way == "fold" else 8 * U * (1.0 + rate * count * h)
+    assert max(off) <= limit
 
 
 def test_backwards_is_back_at_the_start():

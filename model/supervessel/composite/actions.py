@@ -7,7 +7,9 @@ from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass
 
 import casadi as ca
+import numpy as np
 
+from supervessel.composite.anchors import from_anchor
 from supervessel.composite.bodies import Lookup, placed_groups, vessel_body
 from supervessel.composite.inertia import Body, from_upper_triangle, offset_tensor, upper_triangle
 from supervessel.composite.poses import Pose, constant
@@ -19,7 +21,8 @@ from supervessel.scene.schema import Scene
 from supervessel.scene.variables import InputVariable
 
 Placed = Mapping[str, tuple[Pose, ca.SX | None]]
-"""Poses of vessels in the root's axes, and whether they hang on the root (None: always)."""
+"""Poses of vessels, whose origins are their anchors, in the root's axes, and whether they hang on the root
+(None: always)."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,8 @@ class Acting:
 def _at_point(scene: Scene, name: str, where: Placed, centre: ca.SX) -> Acting:
     """Returns the matrices of a force at the point called "vessel.point"."""
     pose, attached = where[vessel_of(name)]
-    arm = pose.origin + pose.rotation @ constant(scene.point(name).position) - centre
+    position = from_anchor(scene, vessel_of(name), scene.point(name).position)
+    arm = pose.origin + pose.rotation @ constant(position) - centre
     turned = pose.rotation if attached is None else attached * pose.rotation
     return Acting(ca.skew(arm) @ turned, turned)
 
@@ -73,7 +77,7 @@ def equation_of(kind: InputKind) -> Equation | None:
 def action_parts(resolved: ResolvedScene, lookup: Lookup, centre: ca.SX) -> dict[str, ca.SX]:
     """Returns the parts of c by which forces and torques on vessels act.
 
-    centre : barycentre, (3,) [m], root axes
+    centre : barycentre, (3,) [m], root axes, from the root's anchor
 
     "moment" : (9 n,), the matrices `Acting.moment`, column by column, of each force, then of each torque on a
                vessel
@@ -156,17 +160,19 @@ def vessel_parts(resolved: ResolvedScene, lookup: Lookup, whole: Body) -> dict[s
     for name in resolved.vessels_shown:
         pose, attached = where[name]
         body = vessel_body(resolved.scene, name, lookup, Pose(ca.SX.eye(3), ca.SX.zeros(3)))
-        part = _vessel_part(body, pose, whole)
+        origin = constant(from_anchor(resolved.scene, name, np.zeros(3)))
+        part = _vessel_part(body, pose, origin, whole)
         parts[f".{name}"] = part if attached is None else attached * part
     return parts
 
 
-def _vessel_part(body: Body, pose: Pose, whole: Body) -> ca.SX:
+def _vessel_part(body: Body, pose: Pose, origin: ca.SX, whole: Body) -> ca.SX:
     """Returns the part of c, (28,), of a docked vessel, in the layout of SIZES.
 
-    body  : the vessel in its own axes
-    pose  : of the vessel in the root's axes
-    whole : the composite as one body
+    body   : the vessel in its own axes, from its anchor
+    pose   : of the vessel in the root's axes, its origin the anchor
+    origin : (3,) [m], of its axes, from its anchor
+    whole  : the composite as one body
     """
     seen = body.seen_from(pose.rotation, pose.origin, pose.velocity, pose.rate)
     rho = seen.centre - whole.centre
@@ -177,8 +183,8 @@ def _vessel_part(body: Body, pose: Pose, whole: Body) -> ca.SX:
         spin = seen.mass * ca.cross(rho, velocity - whole.velocity)
         spin = spin if seen.spin is None else spin + seen.spin
         rate = rate if pose.rate is None else pose.rate
-    origin, R_body_vessel = pose.origin - whole.centre, ca.vec(pose.rotation)
-    return ca.vertcat(1.0, origin, rho, R_body_vessel, rate, upper_triangle(inertia), spin)
+    place, R_body_vessel = pose.origin + pose.rotation @ origin - whole.centre, ca.vec(pose.rotation)
+    return ca.vertcat(1.0, place, rho, R_body_vessel, rate, upper_triangle(inertia), spin)
 
 
 def vessel_outputs(name: str, part: ca.SX, attitude: ca.SX, omega: ca.SX) -> dict[str, ca.SX]:

@@ -13,11 +13,13 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from supervessel.composite.anchors import from_anchor
 from supervessel.composite.constants import Places
 from supervessel.composite.docks import Joint, Way
 from supervessel.composite.inertia import Body, combine, orbiter_moments, placed_body, symmetric
 from supervessel.composite.poses import Pose, constant, mated_pose, port_axes, scaled
 from supervessel.composite.resolved import ResolvedScene, RigidGroup
+from supervessel.scene.inputs import vessel_of
 from supervessel.scene.schema import Scene
 from supervessel.scene.variables import InputVariable
 
@@ -58,12 +60,12 @@ class PlacedGroup:
     inside: Places
 
     def pose_of(self, vessel: str) -> Pose:
-        """Returns the pose of one of its vessels in the root vessel's axes."""
+        """Returns the pose of one of its vessels, whose origin is its anchor, from the root's anchor."""
         return self.pose.then(self.inside[vessel])
 
 
 def composite_body(resolved: ResolvedScene, lookup: Lookup) -> Body:
-    """Returns what hangs on the root as one body in the root vessel's axes.
+    """Returns what hangs on the root as one body in the root vessel's axes, their origin at its anchor.
 
     Vessels between which there is no pose input and no dock input form a rigid group. Its vessels of constant
     mass are combined in the axes of the group's first vessel, so that they are numbers before the group is
@@ -225,9 +227,9 @@ def _contact_motion(scene: Scene, joint: Joint, lookup: Lookup, pose: Pose) -> t
 
 
 def _port(scene: Scene, name: str, lookup: Lookup) -> tuple[ca.SX, ca.SX]:
-    """Returns position and axes of a port in its vessel's axes."""
+    """Returns position, from its vessel's anchor, and axes of a port in the vessel's axes."""
     port = scene.port(name)
-    position = lookup(f"{name}.position", port.position)
+    position = lookup(f"{name}.position", from_anchor(scene, vessel_of(name), port.position))
     direction, alignment = (
         lookup(f"{name}.{key}", scaled(getattr(port, key))) for key in ("direction", "alignment")
     )
@@ -243,4 +245,5 @@ def vessel_body(scene: Scene, name: str, lookup: Lookup, pose: Pose) -> Body:
         specific_inertia = ca.diag(orbiter_moments(pmi) if scene.convention == "orbiter" else pmi)
     else:
         specific_inertia = constant(vessel.specific_inertia)
-    return placed_body(mass, specific_inertia, constant(vessel.centre_of_mass), pose.rotation, pose.origin)
+    centre = constant(from_anchor(scene, name, vessel.centre_of_mass))
+    return placed_body(mass, specific_inertia, centre, pose.rotation, pose.origin)

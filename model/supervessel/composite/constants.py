@@ -12,13 +12,15 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from supervessel.composite.anchors import from_anchor
 from supervessel.composite.docks import Joint, VesselGroup
 from supervessel.composite.inertia import combine_numbers, orbiter_moments, placed_body
 from supervessel.composite.poses import Pose, constant, mated_pose, port_axes, scaled
+from supervessel.scene.inputs import vessel_of
 from supervessel.scene.schema import Scene, Vessel
 
 Places = Mapping[str, Pose]
-"""Poses of vessels, constants, in the axes of their group."""
+"""Poses of vessels, whose origins are their anchors, constants, in the axes of their group."""
 
 
 def places(scene: Scene, parts: Sequence[VesselGroup]) -> list[Places]:
@@ -72,7 +74,7 @@ def _seen(
     centres, inertias = _placed_bodies()(
         masses[None, :],
         np.hstack([_specific_inertia(scene, vessel) for vessel in vessels]),
-        np.array([vessel.centre_of_mass for vessel in vessels]).T,
+        np.array([from_anchor(scene, name, scene.vessels[name].centre_of_mass) for name in placed]).T,
         ca.evalf(ca.horzcat(*(pose.rotation for pose in placed.values()))),
         ca.evalf(ca.horzcat(*(pose.origin for pose in placed.values()))),
     )
@@ -90,14 +92,14 @@ def _mated_poses(scene: Scene, joints: Sequence[Joint]) -> list[Pose]:
     """Returns the pose of the child in the parent's axes of each joint, none of whose ports moves."""
     if not joints:
         return []
-    ports = [[scene.port(joint.ports[side]) for joint in joints] for side in (0, 1)]
+    ports = [[(joint.ports[side], scene.port(joint.ports[side])) for joint in joints] for side in (0, 1)]
     numbers = [
         np.array(vectors).T
         for side in ports
         for vectors in (
-            [port.position for port in side],
-            [scaled(port.direction) for port in side],
-            [scaled(port.alignment) for port in side],
+            [from_anchor(scene, vessel_of(name), port.position) for name, port in side],
+            [scaled(port.direction) for _, port in side],
+            [scaled(port.alignment) for _, port in side],
         )
     ]
     rotations, origins = _mated()(*numbers)

@@ -9,8 +9,10 @@ from dataclasses import dataclass
 import casadi as ca
 
 from supervessel.composite.actions import action_parts, vessel_parts
+from supervessel.composite.anchors import anchor
 from supervessel.composite.bodies import composite_body, lookup_in
 from supervessel.composite.inertia import Body, ldl, ldl_inverse, upper_triangle
+from supervessel.composite.poses import constant
 from supervessel.composite.resolved import ResolvedScene
 from supervessel.layout import slices_of, stacked
 from supervessel.rotation.laws import LAWS
@@ -93,14 +95,14 @@ def composite_parts(resolved: ResolvedScene, p: ca.SX) -> dict[str, ca.SX]:
 def body_parts(scene: Scene, body: Body) -> dict[str, ca.SX]:
     """Returns the parts of c that follow from the composite as one body.
 
-    body : the composite in the root vessel's axes
+    body : the composite in the root vessel's axes, their origin at its anchor
     """
     J, law = body.inertia, scene.rotation.law
     may_be_point = law == "none"  # the one law that takes a mass point, whose moments are zero
     lower, pivots = ldl(J, singular=may_be_point)
     parts = {
         "mass": body.mass,
-        "barycentre": body.centre,
+        "barycentre": body.centre + constant(anchor(scene, scene.root)),
         "inertia": upper_triangle(J),
         "pmi": ca.diag(J) / body.mass,
         "margins": _margins(J, pivots, may_be_point),

@@ -7,7 +7,7 @@ import casadi as ca
 from supervessel.rotation.axes import AxesGraph
 from supervessel.rotation.dynamics import Dynamics
 from supervessel.rotation.propagators import PROPAGATORS, Plan
-from supervessel.rotation.propagators.bound import fastest_square
+from supervessel.rotation.propagators.bound import fastest_square, longest_step, smooth_length
 from supervessel.rotation.propagators.exact import free_functions, free_functions_of_start
 from supervessel.rotation.propagators.method import Step, StepSymbols
 from supervessel.scene.schema import Scene
@@ -19,6 +19,7 @@ class StepFunctions:
 
     fastest_square : x, u, c -> square [rad2/s2] of a rate that the body does not exceed while it turns by the
                      scene's largest angle of a sub-step
+    longest_step   : x, u, c -> that angle over that rate [s], with derivatives at rest and without torque too
     step           : x, u, c, h -> x after one sub-step of h [s]; its second result is the estimated error,
                      (2,), where the method is controlled by it or the scene shows it
     error_exponent : power of h with which the estimated error grows
@@ -28,6 +29,7 @@ class StepFunctions:
     """
 
     fastest_square: ca.Function
+    longest_step: ca.Function
     step: ca.Function
     error_exponent: int
     propagation: tuple[ca.Function, ...]
@@ -57,13 +59,14 @@ def step_functions(
     assert method.build is not None
     built = method.build(motion)
     rate_square = _rate_function(scene.rotation.max_angle_step, motion, dynamics, symbols)
+    longest = _longest_step_function(scene.rotation.max_angle_step, motion, dynamics, symbols)
     step = _step_function(built, symbols, h)
     series = ca.Function(
         "by_torque", [*symbols[1:]], [motion.acceleration_by_torque], ["u", "c"], ["acceleration"]
     )
     needed = {"angle": (rate_square, step), "error": (step,), "series": (series,)}
     stepping = needed[plan.method.control] if plan.method else ()
-    return StepFunctions(rate_square, step, built.exponent, (*stepping, *_free_motion(plan, axes)))
+    return StepFunctions(rate_square, longest, step, built.exponent, (*stepping, *_free_motion(plan, axes)))
 
 
 def _rate_function(
@@ -73,9 +76,21 @@ def _rate_function(
 
     angle : largest angle of a sub-step [rad]
     """
-    omega, by_torque = motion.state[4:], motion.acceleration_by_torque
-    square = fastest_square(omega, by_torque, motion.law.growth, angle, dynamics.spin_square)
+    by_torque = ca.sqrt(ca.sumsqr(motion.acceleration_by_torque))
+    square = fastest_square(motion.state[4:], by_torque, motion.law.growth, angle, dynamics.spin_square)
     return ca.Function("fastest_square", [*symbols], [square], ["x", "u", "c"], ["rate_square"])
+
+
+def _longest_step_function(
+    angle: float, motion: StepSymbols, dynamics: Dynamics, symbols: tuple[ca.SX, ca.SX, ca.SX]
+) -> ca.Function:
+    """Returns longest_step.
+
+    angle : largest angle of a sub-step [rad]
+    """
+    by_torque = smooth_length(motion.acceleration_by_torque)
+    square = fastest_square(motion.state[4:], by_torque, motion.law.growth, angle, dynamics.spin_square)
+    return ca.Function("longest_step", [*symbols], [longest_step(square, angle)], ["x", "u", "c"], ["h_max"])
 
 
 def _step_function(built: Step, symbols: tuple[ca.SX, ca.SX, ca.SX], h: ca.SX) -> ca.Function:

@@ -21,6 +21,9 @@ from supervessel.twin.input_values import placed_values, settled
 GAP = 1e-8
 """Least difference of principal moments, over the largest, for derivatives of free motion by p."""
 
+MANY = 2.0**900
+"""Makes any moment above 2^-847 kg m2 a whole number; the square of it makes any change of one infinite."""
+
 
 X_NAMES = (
     *(f"state.attitude[{i}]" for i in range(1, 5)),
@@ -139,13 +142,15 @@ class Plant:
     def longest_step(self) -> TwinFunction:
         """x, u, p -> h_max, the longest sub-step [s] that the FMU takes from x by "rk4".
 
+        Infinite at rest without torque, with derivatives 0. Without torque it has a kink in u: its derivative
+        there is 0, the mean of those to either side.
+
         Example:
             >>> round(float(twin.longest_step(twin.x_start, [0, 0, 0], twin.p_start)), 2)
             45.02
         """
         with simplification(False):
-            fastest = self._model.steps.fastest_square(self.x, self.u, self._c)
-            longest = self.scene.rotation.max_angle_step / ca.sqrt(fastest)
+            longest = self._model.steps.longest_step(self.x, self.u, self._c)
         return self._function("longest_step", self._at, {"h_max": longest}, unit=False)
 
     @cached_property
@@ -208,7 +213,9 @@ class Plant:
         """Returns the function x, u (m, N), p, h -> x_next (7, N) of N steps under one p.
 
         The composite is computed once: a step costs less than one of `step.mapaccum`, whose p may change
-        at each. The numbers are the same.
+        at each. The numbers are the same; of "exact" each state is found from the first one, as in the FMU,
+        so that roundings do not pile up. Its doublings are as many more as N steps of the room of one take,
+        and it is NaN from the first torque on.
 
         Example:
             >>> states = twin.rollout(50)(x=twin.x_start, u=[0, 0, 100], h=0.1)["x_next"]
@@ -219,14 +226,21 @@ class Plant:
             raise ValueError(f"rollout: {count!r} steps: must be a whole number from 1")
         x, u = ca.MX.sym("x", 7), ca.MX.sym("u", self.u.numel(), count)
         p, h = ca.MX.sym("p", self.p.numel()), ca.MX.sym("h")
+        always_free = self._model.plan.method is None
+        more = (count - 1).bit_length() if always_free else 0
         c, a = (ca.SX.sym(name, part.numel()) for name, part in (("c", self._c), ("a", self._a)))
         with simplification(False):
-            end = self._stepped(c, a)
+            end = self._stepped(c, a, more)
         numbers = ca.vertcat(c, a)
         used = [i for i, needed in enumerate(ca.which_depends(end, numbers, 1, False)) if needed]
         step = ca.Function("step_of_composite", [self.x, self.u, numbers[used], self.h], [end])
         composite = ca.Function("numbers", [self.p], [ca.densify(ca.vertcat(self._c, self._a)[used])])
-        states = step.mapaccum(count)(x, u, ca.repmat(composite(p), 1, count), ca.repmat(h, 1, count))
+        known = ca.repmat(composite(p), 1, count)
+        if always_free:
+            so_far = ca.cumsum(ca.fabs(u), 1) if self.u_names else u
+            states = step.map(count)(ca.repmat(x, 1, count), so_far, known, h * ca.DM(range(1, count + 1)).T)
+        else:
+            states = step.mapaccum(count)(x, u, known, ca.repmat(h, 1, count))
         return self._checked(ca.Function("rollout", [x, u, p, h], [states], ["x", "u", "p", "h"], ["x_next"]))
 
     @property
@@ -244,20 +258,23 @@ class Plant:
         defaults |= {"p": self.p_start, "p_next": self.p_start}
         return TwinFunction(function, defaults, unit)
 
-    def _stepped(self, c: ca.SX, a: ca.SX) -> ca.SX:
-        """Returns the state after h by the scene's method, (7,), an expression of x, u, h, c and a."""
+    def _stepped(self, c: ca.SX, a: ca.SX, more: int = 0) -> ca.SX:
+        """Returns the state after h by the scene's method, (7,), an expression of x, u, h, c and a.
+
+        more : doublings of free motion, beyond the twin's own
+        """
         model = self._model
 
         def free(x: ca.SX) -> ca.SX:
             axes = a[model.slices.axes["free"]]
-            end = free_step(x, axes[:3], ca.reshape(axes[3:], 3, 3), self.h, self.doublings)
+            end = free_step(x, axes[:3], ca.reshape(axes[3:], 3, 3), self.h, self.doublings + more)
             return end + _zero_without_derivative_at_equal(axes[:3])
 
         def stepped(x: ca.SX) -> ca.SX:
             return model.steps.step.call([x, self.u, c, self.h])[0]
 
         if model.plan.method is None:
-            pushed = ca.sumsqr(self.u) > 0.0 if self.u_names else ca.SX(0.0)
+            pushed = ca.norm_1(self.u) > 0.0 if self.u_names else ca.SX(0.0)
             return free(self.x) + ca.if_else(pushed, ca.SX.nan(), 0.0)
         if model.plan.free == "between kicks":
             return stepped(free(stepped(self.x)))
@@ -265,10 +282,18 @@ class Plant:
 
 
 def _zero_without_derivative_at_equal(moments: ca.SX) -> ca.SX:
-    """Returns 0; its derivative is NaN where moments, (3,), ascending, are too close to tell axes by."""
+    """Returns 0; its derivative is NaN where moments, (3,), ascending, are too close to tell axes by.
+
+    That is, NaN times a change of the moments, but 0 where they do not change: CasADi's forward mode carries
+    changes that are 0 along, and 0 times a NaN would be one.
+    """
     if moments.is_constant():
         return ca.SX(0.0)
     least = ca.fmin(moments[1] - moments[0], moments[2] - moments[1])
-    beyond = least - GAP * moments[2]
-    # sqrt(0) has the derivative infinity; that of what it is taken from is 0 below the limit
-    return ca.if_else(beyond <= 0.0, ca.sqrt(ca.fmax(beyond, 0.0)), 0.0)
+    close = least <= GAP * moments[2]
+
+    def zero(whole: ca.SX) -> ca.SX:
+        """Whole numbers are their own floor, whose derivative is 0: this changes as they do, infinitely."""
+        return ca.dot(ca.floor(whole), ca.if_else(close, whole - ca.floor(whole), 0.0))
+
+    return zero(MANY * moments) - zero(2.0 * MANY * moments)  # infinity less infinity

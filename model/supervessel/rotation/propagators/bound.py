@@ -7,29 +7,41 @@ import casadi as ca
 
 def fastest_square(
     angular_velocity: ca.SX,
-    torque_acceleration: ca.SX,
+    by_torque: ca.SX,
     growth: float,
     angle: float,
     spin_square: ca.SX | None = None,
 ) -> ca.SX:
     """Returns the square, [rad2/s2], of a rate that the body does not exceed while it turns by `angle`.
 
-    angular_velocity    : (3,) [rad/s], now
-    torque_acceleration : (3,) [rad/s2], what the torque alone gives, constant in body axes
-    growth              : bound g of d|omega|/dt over |omega|^2 by the gyroscopic term
-    angle               : [rad]
-    spin_square         : square of a bound b, [rad2/s2], of what the spin of moving parts adds to the
-                          acceleration, over |omega|; None: none moves
+    angular_velocity : (3,) [rad/s], now
+    by_torque        : length a of the acceleration [rad/s2] by the torque alone, constant in body axes
+    growth           : bound g of d|omega|/dt over |omega|^2 by the gyroscopic term
+    angle            : [rad]
+    spin_square      : square of a bound b, [rad2/s2], of what the spin of moving parts adds to the
+                       acceleration, over |omega|; None: none moves
 
-    With w = |omega| and a = |torque_acceleration|, dw/dt <= g w^2 + a. Over the angle s turned, ds = w dt,
-    this reads d(w^2)/ds <= 2 g w^2 + 2 a, so that w^2 <= w_0^2 e + 2 a f at the end of the angle, with
-    e = exp(2 g s), f = (e - 1)/(2 g), or s where g = 0. A step of angle/w at that rate cannot turn further.
+    With w = |omega|, dw/dt <= g w^2 + a. Over the angle s turned, ds = w dt, this reads
+    d(w^2)/ds <= 2 g w^2 + 2 a, so that w^2 <= w_0^2 e + 2 a f at the end of the angle, with e = exp(2 g s),
+    f = (e - 1)/(2 g), or s where g = 0. A step of angle/w at that rate cannot turn further.
     """
     if spin_square is not None:
         e = exp((2.0 * growth + 1.0) * angle)
         f = (e - 1.0) / (2.0 * growth + 1.0)
-        by_torque = 2.0 * ca.sqrt(ca.sumsqr(torque_acceleration))
-        return e * ca.sumsqr(angular_velocity) + f * (by_torque + spin_square) + spin_square
+        return e * ca.sumsqr(angular_velocity) + f * (2.0 * by_torque + spin_square) + spin_square
     e = exp(2.0 * growth * angle)
     f = (e - 1.0) / (2.0 * growth) if growth else angle
-    return e * ca.sumsqr(angular_velocity) + 2.0 * f * ca.sqrt(ca.sumsqr(torque_acceleration))
+    return e * ca.sumsqr(angular_velocity) + 2.0 * f * by_torque
+
+
+def longest_step(rate_square: ca.SX, angle: float) -> ca.SX:
+    """Returns angle over a rate [s], given by its square: infinite, with derivatives 0, where it is 0."""
+    moves = rate_square > 0.0
+    return ca.if_else(moves, angle / ca.sqrt(ca.if_else(moves, rate_square, 1.0)), ca.inf)
+
+
+def smooth_length(vector: ca.SX) -> ca.SX:
+    """Returns the length of a vector, with derivative 0, the mean of those to either side, where it is 0."""
+    square = ca.sumsqr(vector)
+    some = square > 0.0
+    return ca.if_else(some, ca.sqrt(ca.if_else(some, square, 1.0)), 0.0)

@@ -1,15 +1,30 @@
 """Exact free motion seen from the body axes, as functions for C and for the twin."""
 
+from collections.abc import Sequence
+from functools import reduce
+from operator import add
+
 import casadi as ca
 
 from supervessel.rotation.attitude import product, unit
+from supervessel.rotation.laws import principal_products
 from supervessel.rotation.propagators import free_motion, theta
 from supervessel.rotation.propagators.method import Propagator
 
 STATE_SIZE = 7
 
-SLOWEST = 2.0**-960
-"""Rate [rad/s] below which rates are no longer brought to about 1."""
+SHORT = 2.0**-5
+"""Angle [rad] up to which `free_step` is a series of order SHORT_ORDER.
+
+The closed form's turn is known to some u; over the angle, so are its derivatives by the rates.
+"""
+
+SHORT_ORDER = 10
+"""Highest power of the time in that series.
+
+In a rigid body its terms fall at least as those of 1/(1 - SHORT), so that what is left out of derivatives is
+below 12 SHORT^11 = 2^-51 of them.
+"""
 
 
 def free_functions(size: int, where: slice) -> list[ca.Function]:
@@ -75,9 +90,55 @@ def free_step(state: ca.SX, moments: ca.SX, R_body_principal: ca.SX, time: ca.SX
                        by more than LARGEST_TURN
     """
     omega = R_body_principal.T @ state[4:]
-    fastest = ca.fmax(ca.mmax(ca.fabs(omega)), SLOWEST)
-    turn, end = free_motion.free_turn(moments / moments[2], omega / fastest, time * fastest, doublings)
-    return _in_body(state, R_body_principal, turn, fastest * end)
+    is_short = ca.sumsqr(omega * time) <= SHORT**2
+    short = short_step(state, moments, R_body_principal, ca.if_else(is_short, time, 0.0))
+    fastest = ca.if_else(is_short, 1.0, ca.mmax(ca.fabs(omega)))
+    moving, span = ca.if_else(is_short, ca.SX([0.5, 0.75, 0.625]), omega / fastest), time * fastest
+    closed = free_motion.free_turn(moments / moments[2], moving, ca.if_else(is_short, 0.0, span), doublings)
+    turn, end = closed
+    return ca.if_else(is_short, short, _in_body(state, R_body_principal, turn, fastest * end))
+
+
+def short_step(state: ca.SX, moments: ca.SX, R_body_principal: ca.SX, time: ca.SX) -> ca.SX:
+    """Returns what `free_step` does, and its derivatives, where the body turns by SHORT at the most.
+
+    Taylor series of the rates and of the turn p in s = (time since the start)/time, as in `taylor`, with half
+    angles y = omega time/2 beside omega, since products of rates alone might underflow. In principal axes,
+    with (i, j, l) cyclic, a the factors of Euler's equations and sums over m from 0 to k,
+    (k + 1) omega_i,k+1 = 2 a_i sum y_j,m omega_l,k-m and (k + 1) p_k+1 = sum p_m (0, y_k-m).
+    The rate and the half angle themselves stay in body axes: no derivative by them or by the axes comes out
+    of a difference.
+    """
+    factors, rate = principal_products(moments), R_body_principal.T @ state[4:]
+    half = 0.5 * time
+    rates, angles = [rate], [half * rate]
+    turns = [ca.vertcat(0.0, angles[0])]
+    for k in range(SHORT_ORDER):
+        scale = 2.0 / (k + 1)
+        pairs = zip(angles, reversed(rates), strict=True)
+        rates.append((scale * factors) * _total([_products(y, w) for y, w in pairs]))
+        turned = [_turned(turn, y) for turn, y in zip(turns, reversed(angles), strict=True)]
+        angles.append(half * rates[-1])
+        turns.append((1.0 / (k + 2)) * _total([ca.vertcat(0.0, angles[-1]), *turned]))
+    bent = _total(turns[:0:-1])
+    turn = ca.vertcat(bent[0], half * state[4:] + R_body_principal @ bent[1:])
+    attitude = state[:4] + product(state[:4], turn)
+    return ca.vertcat(unit(attitude), state[4:] + R_body_principal @ _total(rates[:0:-1]))
+
+
+def _products(y: ca.SX, w: ca.SX) -> ca.SX:
+    """Returns y_j w_k, (3,), (i, j, k) cyclic."""
+    return ca.vertcat(y[1] * w[2], y[2] * w[0], y[0] * w[1])
+
+
+def _turned(turn: ca.SX, vector: ca.SX) -> ca.SX:
+    """Returns the product of a quaternion and (0, vector), (4,)."""
+    return ca.vertcat(-ca.dot(turn[1:], vector), turn[0] * vector + ca.cross(turn[1:], vector))
+
+
+def _total(terms: Sequence[ca.SX]) -> ca.SX:
+    """Returns the sum, the first terms first."""
+    return reduce(add, terms)
 
 
 def _in_body(state: ca.SX, R_body_principal: ca.SX, turn: ca.SX, omega_end: ca.SX) -> ca.SX:
