@@ -46,6 +46,7 @@ int docked_rate(const double **arg, double **res, int *iw, double *w, int mem); 
 int fastest_square(const double **arg, double **res, int *iw, double *w, int mem);    /* x, u, c -> rad2/s2 */
 int step(const double **arg, double **res, int *iw, double *w, int mem);              /* x, u, c, h -> x, error */
 int by_torque(const double **arg, double **res, int *iw, double *w, int mem);         /* u, c -> rad/s2 */
+int rounding(const double **arg, double **res, int *iw, double *w, int mem);          /* x, u, c, h -> rad */
 int free_phase(const double **arg, double **res, int *iw, double *w, int mem);        /* x, a, t -> rad */
 int free_start(const double **arg, double **res, int *iw, double *w, int mem);        /* x, a, t, share -> v, k */
 int free_double(const double **arg, double **res, int *iw, double *w, int mem);       /* v, k -> v */

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "composite.h"
+#include "model.h"
 #include "variables.h"
 
 /* Rounding that an importer's own times may show, which are sums of its step sizes or multiples of one, counted from
@@ -46,6 +47,22 @@ static double listen(Instance *instance, double end) {
     return larger(early, instance->now.values[REFERENCE_TIME]);
 }
 
+/* What rounding of the composite's tensor turns the body by [rad], `elapsed` after it was at x. */
+static double turned_by_rounding(Instance *instance, const double x[], double elapsed) {
+#if ROUNDING
+    double angle;
+    instance_set_arguments(instance);
+    instance->arg[0] = x;
+    instance->arg[3] = &elapsed;
+    instance->res[0] = &angle;
+    rounding(instance->arg, instance->res, instance->iw, instance->w, 0);
+    return angle;
+#else
+    (void)instance, (void)x, (void)elapsed;
+    return 0.0;
+#endif
+}
+
 static void begin(Progress *progress, double h) {
     progress->h = progress->remaining = h;
     progress->taken = progress->error = progress->next_size = 0.0;
@@ -75,7 +92,8 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
             return status;
         }
         now->values[REFERENCE_TIME] = progress.remaining > 0.0 ? end - progress.remaining : end;
-        now->error_estimate = progress.error;
+        now->error_estimate =
+            progress.error + turned_by_rounding(instance, start, now->values[REFERENCE_TIME] - start_time);
         if (!instance->sub_step_ended) continue;
         const double wanted = listen(instance, end);
         if (now->state == TERMINATED) return STATUS_ERROR;

@@ -140,6 +140,7 @@ def _plan(model: Equations) -> dict[str, object]:
         "ERROR_EXPONENT": model.steps.error_exponent,
         "SAFETY": repr(method.safety if method else 1.0),
         "PRODUCT_COUNT": model.product_count,
+        "ROUNDING": int(any(f.name() == "rounding" for f in model.steps.propagation)),
     }
 
 

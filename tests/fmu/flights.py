@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from support import ISS_DG, OK, PROPAGATORS, TURNING, Array, Instance, random_rotation, variant
-from support.series import Vector, flight, norm
+from support.series import Number, Vector, flight, mp, norm
 
 FREE = ("exact", "auto")  # what free motion is exact for
 EVERY = pytest.mark.parametrize("propagator", PROPAGATORS)
@@ -35,6 +35,51 @@ def assembly(propagator: str, tolerance: float = 1e-9) -> dict[str, Any]:
     }
     changes = {"name": f"assembly_{propagator}", "rotation": rotation, "outputs.names": OUTPUTS}
     return variant(ISS_DG, changes)
+
+
+@cache
+def slender(thin: float, propagator: str) -> dict[str, Any]:
+    """Returns a slender vessel, its least moment `thin` of the others, docked askew to a light root."""
+    port = {"position": [0.0, 0.0, 0.0], "direction": [1.0, 2.0, 3.0], "alignment": [3.0, 0.0, -1.0]}
+    other = {"position": [0.0, 0.0, 0.0], "direction": [1.0, -1.0, 2.0], "alignment": [1.0, 1.0, 0.0]}
+    return {
+        "name": f"slender_{propagator}",
+        "root": "A",
+        "vessels": {
+            "A": {"mass": 1e-3 * thin, "pmi": [1e-6] * 3, "ports": {"p": port}},
+            "B": {"mass": 1000.0, "pmi": [thin, 1.0, 1.0], "ports": {"p": other}},
+        },
+        "docks": [{"ports": ["A.p", "B.p"]}],
+        "rotation": {
+            "propagator": propagator,
+            "tolerance": 1e-12,
+            "max_angle_step": 0.01,
+            "angular_velocity": [0.3, -0.2, 0.5],
+        },
+        "inputs": {"mass": ["B"]},
+        "outputs": {"names": ["inertia", "angular_velocity", "attitude", "error_estimate"]},
+    }
+
+
+def slender_tensor(thin: float) -> list[list[Number]]:
+    """Returns the tensor of `slender`, whose vessels' centres of mass are one point, to all digits."""
+
+    def axes(direction: Sequence[int], alignment: Sequence[int]) -> list[Vector]:
+        """Of a port whose alignment is perpendicular to its direction: rows d, a, d x a."""
+        d, a = ([mp.mpf(x) / norm([mp.mpf(y) for y in v]) for x in v] for v in (direction, alignment))
+        return [d, a, [d[i - 2] * a[i - 1] - d[i - 1] * a[i - 2] for i in range(3)]]
+
+    parent, child = axes((1, 2, 3), (3, 0, -1)), axes((1, -1, 2), (1, 1, 0))
+    R = [
+        [sum(s * p[i] * c[j] for s, p, c in zip((-1, 1, -1), parent, child, strict=True)) for j in range(3)]
+        for i in range(3)
+    ]
+    root = mp.mpf(1e-3 * thin) * mp.mpf(1e-6)
+    own = [1000 * mp.mpf(x) for x in (thin, 1.0, 1.0)]
+    return [
+        [sum(R[i][k] * own[k] * R[j][k] for k in range(3)) + root * (i == j) for j in range(3)]
+        for i in range(3)
+    ]
 
 
 @cache

@@ -17,6 +17,8 @@ from fmu.flights import (
     enter,
     error,
     fly,
+    slender,
+    slender_tensor,
     state,
     tilted,
     tolerant,
@@ -24,6 +26,7 @@ from fmu.flights import (
 from supervessel.rotation.propagators import plan_of
 from support import ERROR, INF, NAN, OK, Instance, U, flying, scene, variant
 from support.marks import FMI
+from support.series import flight, norm
 
 
 @pytest.mark.parametrize(
@@ -126,6 +129,18 @@ def test_the_estimate_is_zero_in_model_exchange(fmi):
     assert instance._status(instance.fmu.setContinuousStates, states, 7) == OK
     assert instance.get("error_estimate") == 0.0
     instance.free()
+
+
+@pytest.mark.parametrize("propagator", ["rk4", "taylor", "exact", "auto"])
+@pytest.mark.parametrize("thin", [1e-3, 1e-6, 1e-9, 1e-12])
+def test_the_estimate_knows_what_rounding_of_the_tensor_comes_to(propagator, thin):
+    """A slender vessel docked askew: its least moment drowns in the rounding of the largest."""
+    with flying(slender(thin, propagator)) as instance:
+        x = state(instance)
+        fly(instance, 1.0)
+        end = flight("tensor", slender_tensor(thin), x, [0.0] * 3, 1.0, digits=40)
+        off = float(2 * norm([float(a) - b for a, b in zip(state(instance), end, strict=True)][:4]))
+        assert off <= instance.get("error_estimate") <= 1e3 * (off + 8 * U)
 
 
 @pytest.mark.parametrize("h", [0.5, 0.25, 0.125, 0.0625])

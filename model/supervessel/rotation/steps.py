@@ -10,6 +10,7 @@ from supervessel.rotation.propagators import PROPAGATORS, Plan
 from supervessel.rotation.propagators.bound import fastest_square, longest_step, smooth_length
 from supervessel.rotation.propagators.exact import free_functions, free_functions_of_start
 from supervessel.rotation.propagators.method import Step, StepSymbols
+from supervessel.rotation.rounding import turned_by_rounding
 from supervessel.scene.schema import Scene
 
 
@@ -25,7 +26,9 @@ class StepFunctions:
     error_exponent : power of h with which the estimated error grows
     propagation    : the functions that the scene's co-simulation uses: of fastest_square and step as many as
                      its method needs; by_torque: u, c -> angular acceleration by the torque alone, (3,)
-                     [rad/s2], for Taylor steps; free_...: exact free motion, see `propagators.exact`
+                     [rad/s2], for Taylor steps; free_...: exact free motion, see `propagators.exact`;
+                     rounding: x, u, c, h -> angle [rad] by which rounding of the tensor turns the body in h,
+                     where the scene shows its error and the law has a gyroscopic term
     """
 
     fastest_square: ca.Function
@@ -64,9 +67,14 @@ def step_functions(
     series = ca.Function(
         "by_torque", [*symbols[1:]], [motion.acceleration_by_torque], ["u", "c"], ["acceleration"]
     )
+    rounding = (
+        [_rounding_function(motion, dynamics, symbols, h)] if shows_error and dynamics.law.products else []
+    )
     needed = {"angle": (rate_square, step), "error": (step,), "series": (series,)}
     stepping = needed[plan.method.control] if plan.method else ()
-    return StepFunctions(rate_square, longest, step, built.exponent, (*stepping, *_free_motion(plan, axes)))
+    return StepFunctions(
+        rate_square, longest, step, built.exponent, (*stepping, *_free_motion(plan, axes), *rounding)
+    )
 
 
 def _rate_function(
@@ -97,6 +105,15 @@ def _step_function(built: Step, symbols: tuple[ca.SX, ca.SX, ca.SX], h: ca.SX) -
     """Returns the function of a step, with its estimated error where it has one."""
     results = {"x_next": built.state} | ({} if built.error is None else {"error": built.error})
     return ca.Function("step", [*symbols, h], [*results.values()], ["x", "u", "c", "h"], [*results])
+
+
+def _rounding_function(
+    motion: StepSymbols, dynamics: Dynamics, symbols: tuple[ca.SX, ca.SX, ca.SX], h: ca.SX
+) -> ca.Function:
+    """Returns rounding."""
+    turning = dynamics.law.turning(dynamics.inertia)
+    angle = turned_by_rounding(turning, motion.state[4:], motion.acceleration_by_torque, h)
+    return ca.Function("rounding", [*symbols, h], [angle], ["x", "u", "c", "h"], ["angle"])
 
 
 def _free_motion(plan: Plan, axes: AxesGraph) -> list[ca.Function]:
