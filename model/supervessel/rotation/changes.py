@@ -77,13 +77,68 @@ def change_functions(
         keep_momentum=_function(
             "keep_momentum", {"omega": omega, "c": c, "d": d}, omega - ldl_solve(*ldl(kept_after), change)
         ),
-        contact_momentum=_function("contact_momentum", {"p": p, "k": k}, _contact_momentum(resolved, p, k)),
+        contact_momentum=_function("contact_momentum", {"p": p, "k": k}, contact_momentum(resolved, p, k)),
         docked_rate=_function(
             "docked_rate",
             {"omega": omega, "momentum": added, "d": d},
             omega + ldl_solve(*ldl(full), added),
         ),
     )
+
+
+@dataclass(frozen=True)
+class ChangeStage:
+    """Part of a change of inputs p, at one instant: the inputs of one kind change.
+
+    kept          : "rate" or "momentum"
+    before, after : p, (n,)
+    """
+
+    kept: str
+    before: ca.SX
+    after: ca.SX
+
+
+def stages(
+    resolved: ResolvedScene, keeps: Mapping[str, str], before: ca.SX, after: ca.SX
+) -> tuple[list[ChangeStage], ca.SX]:
+    """Returns the stages between the docks that open and those that close; and which docks close, (n,).
+
+    keeps         : what changes keep by their kind, see `Scene.keeps`
+    before, after : p, (n,)
+    """
+    kinds = [variable.kind.change for variable in resolved.shaping]
+
+    def taken(stage: ca.SX, kind: str) -> ca.SX:
+        """Returns a stage with the inputs of a kind as they are after the change."""
+        return ca.vertcat(*(after[i] if kinds[i] == kind else stage[i] for i in range(len(kinds))))
+
+    docks = [kind == "docked" for kind in kinds]
+    stage = ca.vertcat(*(before[i] * after[i] if dock else before[i] for i, dock in enumerate(docks)))
+    found = []
+    for kind, kept in keeps.items():
+        following = taken(stage, kind)
+        found.append(ChangeStage(kept, stage, following))
+        stage = following
+    closing = (after[i] * (1.0 - stage[i]) for i, dock in enumerate(docks) if dock)
+    return found, ca.vertcat(ca.SX(0, 1), *closing)
+
+
+def stage_composites(
+    stage: ChangeStage, composite: ca.Function, margins: slice, instead: ca.SX
+) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Returns the composites before and after a stage, and 0, or NaN where momentum cannot be kept over it.
+
+    composite, margins : see `followed`
+    instead            : p of a usable composite, which stands for both where one of them is not
+    """
+    pivots = ca.vertcat(*(composite(at)[margins] for at in (stage.before, stage.after)))
+    usable = reduce(ca.logic_and, ca.vertsplit(pivots > 0.0))
+    moved = reduce(ca.logic_or, ca.vertsplit(stage.before != stage.after))
+    # composites are of something usable always: what is NaN here would be NaN in derivatives
+    c, d = (composite(ca.if_else(usable, at, instead)) for at in (stage.before, stage.after))
+    refused = ca.logic_and(ca.logic_not(usable), moved)
+    return c, d, ca.if_else(refused, ca.SX.nan(), 0.0)
 
 
 def followed(
@@ -98,34 +153,20 @@ def followed(
     keeps the momentum changes an input from or to such a composite; the FMU refuses that change.
     """
     omega, before, after, k = inputs
-    kinds = [variable.kind.change for variable in resolved.shaping]
-
-    def taken(stage: ca.SX, kind: str) -> ca.SX:
-        """Returns a stage with the inputs of a kind as they are after the change."""
-        return ca.vertcat(*(after[i] if kinds[i] == kind else stage[i] for i in range(len(kinds))))
-
-    def kept_over(omega: ca.SX, stage: ca.SX, following: ca.SX) -> ca.SX:
-        """Returns the angular velocity after a change that keeps the momentum."""
-        pivots = ca.vertcat(*(composite(at)[margins] for at in (stage, following)))
-        usable = reduce(ca.logic_and, ca.vertsplit(pivots > 0.0))
-        moved = reduce(ca.logic_or, ca.vertsplit(stage != following))
-        # composites are of something usable always: what is NaN here would be NaN in derivatives
-        c, d = (composite(ca.if_else(usable, at, after)) for at in (stage, following))
-        refused = ca.logic_and(ca.logic_not(usable), moved)
-        return change.keep_momentum(omega, c, d) + ca.if_else(refused, ca.SX.nan(), 0.0)
-
-    flags = [i for i, kind in enumerate(kinds) if kind == "docked"]
-    stage = ca.vertcat(*(before[i] * after[i] if i in flags else before[i] for i in range(len(kinds))))
-    for kind, kept in resolved.scene.keeps.items():
-        following = taken(stage, kind)
-        if kept == "momentum":
-            omega = kept_over(omega, stage, following)
-        stage = following
-    if flags:
-        closing = [after[i] * (1.0 - stage[i]) for i in flags for _ in range(6)]
-        momentum = change.contact_momentum(after, ca.vertcat(*closing) * k)
+    found, closing = stages(resolved, resolved.scene.keeps, before, after)
+    for stage in found:
+        if stage.kept == "momentum":
+            c, d, refused = stage_composites(stage, composite, margins, after)
+            omega = change.keep_momentum(omega, c, d) + refused
+    if closing.numel():
+        momentum = change.contact_momentum(after, each_motion(closing) * k)
         omega = change.docked_rate(omega, momentum, composite(after))
     return omega
+
+
+def each_motion(closing: ca.SX) -> ca.SX:
+    """Returns for each element of k, (6 n,), whether its dock closes, of which docks do, (n,)."""
+    return ca.vertcat(*(flag for flag in ca.vertsplit(closing) for _ in range(6)))
 
 
 def _spin(parts: Parts) -> ca.SX:
@@ -137,7 +178,7 @@ def _function(name: str, arguments: Mapping[str, ca.SX], result: ca.SX) -> ca.Fu
     return ca.Function(name, list(arguments.values()), [ca.densify(result)], list(arguments), ["result"])
 
 
-def _contact_momentum(resolved: ResolvedScene, p: ca.SX, k: ca.SX) -> ca.SX:
+def contact_momentum(resolved: ResolvedScene, p: ca.SX, k: ca.SX) -> ca.SX:
     """Returns the angular momentum about the barycentre, (3,), of parts that move with k as they touch."""
     if not resolved.contact:
         return ca.SX.zeros(3)

@@ -14,6 +14,7 @@ from supervessel.fmu import choose
 from supervessel.rotation.changes import followed
 from supervessel.rotation.propagators.exact import free_step
 from supervessel.scene.schema import PROPAGATOR_NAMES, Scene
+from supervessel.twin.bounds import bound_over_change, bound_over_step
 from supervessel.twin.error_state import ErrorForm
 from supervessel.twin.functions import TwinFunction
 from supervessel.twin.input_values import placed_values, settled
@@ -208,6 +209,56 @@ class Plant:
                 omega = followed(model.resolved, model.change, model.composite, margins, inputs)
         x_next = ca.vertcat(self.x[:4], omega)
         return self._function("change", {"x": self.x, "p": self.p, "p_next": p_next}, {"x_next": x_next})
+
+    @cached_property
+    def error_bound(self) -> TwinFunction:
+        """x, bound, u, p, h -> bound_next: what law and method are off by at most, over a `step` from x.
+
+        bound : (2,), of the difference from the motion of the law "tensor", exactly integrated, with the same
+                inputs: angle [rad] between the attitudes; difference e of the rates in the energy norm
+                sqrt(e . J e) [J^(1/2)], so that |e| is at most that over sqrt(J_min). [0, 0] where both
+                begin alike
+
+        Proven for any h, up to rounding, which is allowed for; a long step gives a larger bound than many
+        short ones, an infinite one where the remainder of "rk4", "taylor" or "dop853" is not known ("dop853":
+        beyond some 0.015 rad). Of "exact" rounding alone is counted. It is large, and useless, where the
+        motion itself is sensitive: over tens of radians of a tumble. Where p changes between steps,
+        `error_bound_change` comes first. Not meant to be differentiated. Derivation, and what it rests on:
+        model/docs/error_bound.md.
+        Raises ValueError for "split", whose steps have no bound.
+
+        Example:
+            >>> bound = twin.error_bound(twin.x_start, [0, 0], [0, 0, 100], twin.p_start, 0.1)
+            >>> bool(bound[0] < 1e-12)  # the law "tensor" leaves nothing out: method and rounding alone
+            True
+        """
+        bound = ca.SX.sym("bound", 2)
+        parts = {name: self._c[place] for name, place in self._model.slices.composite.items()}
+        end = bound_over_step(self._model, parts, bound, (self.x, self.u, self.h))
+        arguments = {"x": self.x, "bound": bound, "u": self.u, "p": self.p, "h": self.h}
+        return self._function("error_bound", arguments, {"bound_next": end})
+
+    @cached_property
+    def error_bound_change(self) -> TwinFunction:
+        """x, bound, p, p_next -> bound_next: `error_bound` over a change of the inputs p at one instant.
+
+        x : before the change, see `change`
+        A mass that goes up and down makes the bound of the rate larger each time. The true motion keeps
+        what the scene says for the law "tensor".
+
+        Example:
+            >>> lighter = twin.p_with({"DG.mass": 12000.0})
+            >>> bound = twin.error_bound_change(twin.x_start, [0, 1], twin.p_start, lighter)
+            >>> bool(bound[1] <= 1.0)  # the rates stay, and so does their difference; the moments shrink
+            True
+        """
+        p_next, bound = ca.SX.sym("p_next", self.p.numel()), ca.SX.sym("bound", 2)
+        shaping = len(self._model.names.p)
+        following = ca.substitute(self._inputs, self.p, p_next)
+        inputs = (self._inputs[:shaping], following[:shaping], following[shaping:])
+        end = bound_over_change(self._model, self.x[4:], bound, inputs)
+        arguments = {"x": self.x, "bound": bound, "p": self.p, "p_next": p_next}
+        return self._function("error_bound_change", arguments, {"bound_next": end})
 
     def rollout(self, count: int) -> TwinFunction:
         """Returns the function x, u (m, N), p, h -> x_next (7, N) of N steps under one p.

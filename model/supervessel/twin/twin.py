@@ -31,6 +31,8 @@ FUNCTIONS = (
     "longest_step",
     "outputs",
     "change",
+    "error_bound",
+    "error_bound_change",
     "error",
     "retract",
     "error_ode",
@@ -71,8 +73,9 @@ class Twin(Plant):
     e = (error of attitude [rad], of angular velocity [rad/s]) about a reference, body axes, (6,)
 
     `composite`, `ode`, `step`, `longest_step`, `outputs`, `rollout` and `communication_step` give the FMU's
-    numbers; `error`, `retract`, `error_ode`, `linearise`, `discretise`, `trim`, `principal`, `invariants` are
-    for control design. All have named arguments, are made when first used, and check numbers that they are
+    numbers; `error_bound` and `error_bound_change` bound what law and method are off by; `error`, `retract`,
+    `error_ode`, `linearise`, `discretise`, `trim`, `principal`, `invariants` are for control design. All have
+    named arguments, are made when first used, and check numbers that they are
     called with (`TwinFunction`). p, u, x, h are symbols; p_names, u_names, x_names, y_names the FMU's names;
     p_start and x_start the scene's values.
 

@@ -1,0 +1,158 @@
+"""How far one step of a method is from the law's exact motion at most: a remainder bound, in CasADi symbols.
+
+The rate obeys w' = c + B w + G(w, w). The power series in the step, of a Runge-Kutta or Taylor step as of the
+exact motion, are majorised by those of one scalar problem, whose coefficients are known: [EB] eqs. (23) to
+(28).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal, localcontext
+from functools import cache
+from math import pi
+
+import casadi as ca
+
+from supervessel.rotation.error_bound import MotionBounds, TurnedBody, by_spin, cross_of_sizes, norm_of
+from supervessel.rotation.laws import RotationLaw
+from supervessel.rotation.propagators import dop853
+from supervessel.scene.numbers import EPSILON
+
+LEAST_COUPLING = 0.25
+"""Least g of [EB] eq. (24): a larger one than the law's is right too, and one majorant of attitudes does."""
+
+DEPTH = 512
+"""Roundings that follow on each other in one step, at most (counted in tests/model/test_error_bound.py)."""
+
+Weights = Mapping[int, float]
+Series = list[Decimal]
+
+RK4_STAGES: tuple[Weights, ...] = ({}, {0: 0.5}, {1: 0.5}, {2: 1.0})
+RK4_WEIGHTS: Weights = {0: 1.0 / 6.0, 1: 1.0 / 3.0, 2: 1.0 / 3.0, 3: 1.0 / 6.0}
+"""Of the method in `propagators.rk4`, as `propagators.dop853` has its own."""
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """Constants of [EB] eq. (27): a step is off by at most v C_w z^n in the rate, C_q z^n in the quaternion.
+
+    power : n, one more than the order
+    limit : largest z for which that is shown
+    rate  : C_w
+    turn  : C_q
+    """
+
+    power: int
+    limit: float
+    rate: float
+    turn: float
+
+
+@cache
+def remainder_of(method: str, order: int = 0) -> Remainder:
+    """Returns the constants of a method, "rk4", "dop853" or "taylor"; order : of "taylor"."""
+    if method == "rk4":
+        return _of_runge_kutta(RK4_STAGES, RK4_WEIGHTS, 4, 0.25)
+    if method == "dop853":
+        return _of_runge_kutta(dop853.STAGES, dop853.WEIGHTS, 8, 2.0**-6)
+    limit = 0.5
+    return Remainder(order + 1, limit, *_exact_tails(order, limit))
+
+
+def _exact_tails(order: int, z: float) -> tuple[float, float]:
+    """Returns the series of 1/(1 - z) and 1/(1 - z)^2 beyond an order, over z^(order + 1). [EB] eq. (26)."""
+    return 1.0 / (1.0 - z), (order + 2.0) / (1.0 - z) + z / (1.0 - z) ** 2
+
+
+def _of_runge_kutta(stages: Sequence[Weights], weights: Weights, order: int, limit: float) -> Remainder:
+    """Returns the constants of an explicit Runge-Kutta method. [EB] eq. (27).
+
+    What the method's own majorant has beyond its order is its value less its first coefficients, with 60
+    digits; one in a thousand is added for rounding to doubles.
+    """
+    with localcontext(prec=60):
+        z = Decimal(limit)
+        value = _majorant(stages, weights, [z], 1)
+        first = _majorant(stages, weights, [Decimal(0), Decimal(1)], order + 1)
+        kept = [sum(c * z**k for k, c in enumerate(part)) for part in first]
+        own = [float((sum(whole) - part) / z ** (order + 1)) for whole, part in zip(value, kept, strict=True)]
+    exact = _exact_tails(order, limit)
+    return Remainder(order + 1, limit, *(1.001 * (a + b) for a, b in zip(own, exact, strict=True)))
+
+
+def _majorant(stages: Sequence[Weights], weights: Weights, step: Series, size: int) -> tuple[Series, Series]:
+    """Returns V and Q after a step of V' = V^2, Q' = 2 Q V from 1, the method's weights taken by their sizes.
+
+    step : series of the step; of the results as many coefficients as `size`
+    """
+    speeds: list[tuple[Series, Series]] = []
+
+    def reached(stage: Weights) -> tuple[Series, Series]:
+        ends = []
+        for part in (0, 1):
+            total = [Decimal(0)] * size
+            for j, weight in stage.items():
+                total = [a + abs(Decimal(weight)) * b for a, b in zip(total, speeds[j][part], strict=True)]
+            end = _times(step, total, size)
+            ends.append([end[0] + 1, *end[1:]])
+        return ends[0], ends[1]
+
+    for stage in stages:
+        V, Q = reached(stage)
+        speeds.append((_times(V, V, size), [2 * c for c in _times(Q, V, size)]))
+    return reached(weights)
+
+
+def _times(a: Series, b: Series, size: int) -> Series:
+    product = [Decimal(0)] * size
+    for i, x in enumerate(a):
+        for j, y in enumerate(b[: max(size - i, 0)]):
+            product[i + j] += x * y
+    return product
+
+
+def step_error(
+    remainder: Remainder | None, law: RotationLaw, numbers: ca.SX, body: TurnedBody, motion: MotionBounds
+) -> ca.SX:
+    """Returns what a step adds at most to the bound, (2,): attitude [rad], energy norm [J^(1/2)].
+
+    remainder : of the method; None for exact free motion, of which rounding alone is counted
+    motion    : of the law over the step
+    Infinite where the step is too long for the bound. [EB] eqs. (24), (27), (28).
+    """
+    h, norm = motion.step, norm_of(body.inertia)
+    rounding, quaternion = _rounding(law, body, motion)
+    energy = ca.norm_2(ca.fabs(norm.lower.T) @ rounding)
+    if remainder is not None:
+        coupling = _coupling(law, numbers)
+        push = ca.norm_2(law.acceleration(numbers, ca.SX.zeros(3), body.torque))
+        spin = ca.norm_fro(by_spin(law, numbers, body.spin))
+        shift = ca.fmax(ca.sqrt(push / coupling), 0.5 * spin / coupling)
+        v = ca.norm_2(motion.start) + shift
+        z = coupling * v * h
+        power = ca.if_else(z <= remainder.limit, z, ca.inf) ** remainder.power
+        if law.gyroscopic_term:
+            energy += ca.norm_fro(norm.lower) * (remainder.rate * v * power)
+        quaternion += remainder.turn * power
+    return ca.vertcat(pi * quaternion, energy)
+
+
+def _coupling(law: RotationLaw, numbers: ca.SX) -> ca.SX:
+    """Returns g with |G(a, b)| <= g |a| |b|, at least LEAST_COUPLING. [EB] eq. (24)."""
+    if not law.products:
+        return ca.SX(LEAST_COUPLING)
+    per = ca.vertcat(*(1.0 if i == j else 0.5 for i, j in law.products))
+    square = ca.sum1(ca.sum2(law.gyroscopic(numbers) ** 2 @ ca.diag(per)))
+    return ca.fmax(ca.sqrt(square), LEAST_COUPLING)
+
+
+def _rounding(law: RotationLaw, body: TurnedBody, motion: MotionBounds) -> tuple[ca.SX, ca.SX]:
+    """Returns what rounding of a step leaves, rate (3,) [rad/s] and quaternion. [EB] eq. (28)."""
+    u, h, reach = 0.5 * EPSILON, motion.step, motion.reach
+    force = ca.fabs(body.torque)
+    if law.gyroscopic_term:
+        force += cross_of_sizes(reach, ca.fabs(body.inertia) @ reach + ca.fabs(body.spin))
+    inertia = law.turning(body.inertia) if law.gyroscopic_term else law.keeping(body.inertia)
+    acceleration = ca.fabs(ca.inv_minor(inertia)) @ force
+    rate = u * (4.0 * reach + (DEPTH * h) * acceleration)
+    return rate, u * (8.0 + (DEPTH * h) * ca.norm_2(reach)) + 0.5 * h * ca.norm_2(rate)

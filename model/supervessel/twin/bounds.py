@@ -1,0 +1,106 @@
+"""The bound of what a scene's law and method are off by, of the twin's own expressions."""
+
+from collections.abc import Mapping
+
+import casadi as ca
+
+from supervessel.composite.inertia import from_upper_triangle
+from supervessel.equations import Equations, composite_slices
+from supervessel.rotation.changes import contact_momentum, each_motion, stage_composites, stages
+from supervessel.rotation.dynamics import dynamics_of
+from supervessel.rotation.error_bound import (
+    TurnedBody,
+    carried,
+    kept_momentum,
+    kept_rate,
+    largest_growth,
+    largest_residual,
+    motion_bounds,
+    norm_of,
+)
+from supervessel.rotation.propagators import PROPAGATORS
+from supervessel.rotation.propagators.taylor import taylor_order
+from supervessel.rotation.step_remainder import Remainder, remainder_of, step_error
+from supervessel.scene.schema import Scene
+
+Parts = Mapping[str, ca.SX]
+
+
+def bound_over_step(model: Equations, parts: Parts, bound: ca.SX, at: tuple[ca.SX, ca.SX, ca.SX]) -> ca.SX:
+    """Returns the bound, (2,) [rad, J^(1/2)], after one step of a scene's method.
+
+    parts : of the composite by name, expressions
+    at    : state x at the start, (7,), inputs that act u, step h [s]
+    Raises ValueError for a method whose steps have no bound.
+    """
+    x, u, h = at
+    dynamics = dynamics_of(model.resolved, parts, u)
+    law, norm = dynamics.law, norm_of(dynamics.inertia)
+    body = TurnedBody(dynamics.inertia, dynamics.torque, spin_of(parts))
+    motion = motion_bounds(law, dynamics.numbers, body, x[4:], h)
+    exact = model.resolved.scene.rotation.law == "tensor"
+    residual = ca.SX(0.0) if exact else largest_residual(norm, body, motion)
+    found = carried(bound, norm.rate_share, largest_growth(norm, motion), residual, h)
+    return found + step_error(method_remainder(model), law, dynamics.numbers, body, motion)
+
+
+def inertia_of(c: ca.SX) -> ca.SX:
+    """Returns the tensor, (3, 3) [kg m2], of a composite."""
+    return from_upper_triangle(c[composite_slices()["inertia"]])
+
+
+def spin_of(parts: Parts) -> ca.SX:
+    """Returns the angular momentum, (3,) [N m s], of parts that move relative to the body axes."""
+    return parts["momentum"][:3] if "momentum" in parts else ca.SX.zeros(3)
+
+
+def method_remainder(model: Equations) -> Remainder | None:
+    """Returns the remainder of a step of a scene's method; None for exact free motion."""
+    method, tolerance = model.plan.method, model.resolved.scene.rotation.tolerance
+    if method is None:
+        return None
+    name = next(name for name, row in PROPAGATORS.items() if row is method)
+    if name == "split":
+        raise ValueError(
+            'error_bound: propagator = "split" has no proven bound of its steps: must be another one'
+        )
+    return remainder_of(name, taylor_order(tolerance) if name == "taylor" else 0)
+
+
+def bound_over_change(
+    model: Equations, omega: ca.SX, bound: ca.SX, inputs: tuple[ca.SX, ca.SX, ca.SX]
+) -> ca.SX:
+    """Returns the bound, (2,) [rad, J^(1/2)], after a change of the inputs p at one instant.
+
+    omega  : of the cheap motion, (3,) [rad/s], before the change
+    inputs : p before, p after, (n,), motions at contact k
+    What the true motion keeps is what the scene says for the law "tensor". Docks that open leave both rates,
+    and those that close alter both alike, except under the law "none". [EB] eqs. (21), (22).
+    """
+    before, after, k = inputs
+    resolved, margins = model.resolved, composite_slices()["margins"]
+    energy, seen_in = bound[1], inertia_of(model.composite(before))
+    kept, closing = stages(resolved, keeps_in_truth(resolved.scene), before, after)
+    for stage in kept:
+        if stage.kept == "rate":
+            continue
+        c, d, refused = stage_composites(stage, model.composite, margins, after)
+        turned = omega if model.change is None else model.change.keep_momentum(omega, c, d)
+        first, last = inertia_of(c), inertia_of(d)
+        excess = last @ turned - first @ omega
+        if "momentum" in model.slices.composite:
+            place = model.slices.composite["momentum"]
+            excess += d[place][:3] - c[place][:3]
+        energy = kept_momentum(kept_rate(energy, seen_in, first), first, last, excess) + refused
+        omega, seen_in = turned, last
+    end = inertia_of(model.composite(after))
+    energy = kept_rate(energy, seen_in, end)
+    if model.change is None and closing.numel():
+        energy += norm_of(end).of_torque(contact_momentum(resolved, after, each_motion(closing) * k))
+    return ca.vertcat(bound[0], energy)
+
+
+def keeps_in_truth(scene: Scene) -> dict[str, str]:
+    """Returns what changes keep, by their kind, in the motion that the bound is about: the law "tensor"."""
+    rotation = scene.rotation.model_copy(update={"law": "tensor"})
+    return dict(scene.model_copy(update={"rotation": rotation}).keeps)
