@@ -2,9 +2,11 @@
 
 import json
 from collections.abc import Mapping
+from math import ceil, floor, log10
 from typing import Any
 
 from fmu_build.accuracy.flights import LONG
+from fmu_build.accuracy.grades import GRADES, LAW_PROVEN, PROVEN, grade_of
 from fmu_build.accuracy.search import MARGIN, Progress, Search, Tried, begun
 from fmu_build.flight.choices import BEST, Choice, reference_choices
 from fmu_build.flight.results import are_numbers, keep, place_of, read
@@ -15,7 +17,7 @@ from supervessel.scene.schema import CHOSEN, Accuracy, Rotation, Scene
 CLAIM = (
     "From the scene's start, in communication steps of that length, with inputs anywhere in their ranges and "
     "held over each step, the error stays within what is asked up to the horizon: against the exact motion "
-    "under the law tensor with the same inputs. It is shown by flights, not proven."
+    "under the law tensor with the same inputs."
 )
 
 NOT_COVERED = (
@@ -29,6 +31,8 @@ NOT_COVERED = (
 
 ABOUT = {
     "asked, attitude, rate": "largest errors of the attitude [rad], of the rate [rad/s]; horizon, step: s",
+    "grade": "what the claim rests on: name; bounds of law and method and of the law alone, attitude [rad], "
+    "rate [rad/s], null where there are none; what is in the way of a better grade; the range to narrow",
     "margin": "least of what is asked over the largest error in flight",
     "doubt": "largest distance of the two ways to the exact motion, in truth",
     "operations": "counted, of a communication step on an average over the flight in which it costs most",
@@ -80,11 +84,20 @@ def _chosen(scene: Scene, accuracy: Accuracy, progress: Progress) -> dict[str, A
     if best is None:
         raise AccuracyError(_refusal(search, accuracy))
     course, (attitude, rate) = search.every.course, search.doubt
+    grade = grade_of(scene, accuracy, best.choice)
     return {
         "about": ABOUT,
         "scene": scene.name,
         "asked": accuracy.model_dump(mode="json"),
-        "claim": CLAIM,
+        "claim": f"{CLAIM} {GRADES[grade.name]}",
+        "grade": {
+            "name": grade.name,
+            "attitude": _upwards(grade.attitude),
+            "rate": _upwards(grade.rate),
+            "law": _upwards(grade.law),
+            "why": grade.why,
+            "narrow": grade.narrow,
+        },
         "not_covered": list(NOT_COVERED),
         "margin": MARGIN,
         "choice": _settings(best.choice),
@@ -134,8 +147,12 @@ def _is_evidence(kept: Any, scene: Scene, accuracy: Accuracy) -> bool:
         numbers += [one["flights"], *((one["attitude"], one["rate"]) if one["refused"] is None else ())]
     for one in kept["dearer"]:
         Rotation.model_validate({key: value for key, value in one.items() if key != "operations"})
+    grade = kept["grade"]
+    numbers += [grade[name] for name in ("attitude", "rate", "law") if grade[name] is not None]
+    texts += [grade["why"], grade["narrow"]]
+    claim = f"{CLAIM} {GRADES[grade['name']]}"
     return (
-        (kept["about"], kept["scene"], kept["claim"]) == (ABOUT, scene.name, CLAIM)
+        (kept["about"], kept["scene"], kept["claim"]) == (ABOUT, scene.name, claim)
         and (kept["not_covered"], kept["margin"]) == (list(NOT_COVERED), MARGIN)
         and kept["asked"] == accuracy.model_dump(mode="json")
         and [(one["enough"], one["refused"]) for one in chosen] == [(True, None)]
@@ -168,6 +185,14 @@ def _brief(value: float) -> float:
     return float(f"{value:.3g}")
 
 
+def _upwards(value: float | None) -> float | None:
+    """Returns a bound rounded up to three digits."""
+    if value is None or value == 0.0:
+        return value
+    unit = 10.0 ** (floor(log10(value)) - 2)
+    return float(f"{ceil(value / unit * (1.0 - 1e-12)) * unit:.3g}")
+
+
 def said(evidence: Mapping[str, Any]) -> str:
     """Returns in one line what was chosen."""
     choice, asked = evidence["choice"], evidence["asked"]
@@ -180,4 +205,14 @@ def said(evidence: Mapping[str, Any]) -> str:
         found += f", {evidence['rate']:.1e} rad/s of {asked['rate']:g} rad/s"
     count = len(evidence["histories"])
     flown = f"largest error in {count} flight{'s' * (count > 1)} of {asked['horizon']:g} s"
-    return f"{settings}: {flown} {found}"
+    return f"{settings}: {_graded(evidence['grade'])}; {flown} {found}"
+
+
+def _graded(grade: Mapping[str, Any]) -> str:
+    """Returns what a choice rests on, and what is in the way of more."""
+    if grade["name"] == PROVEN:
+        return f"proven within {grade['attitude']:.2g} rad"
+    if grade["name"] == LAW_PROVEN:
+        return f"law proven within {grade['law']:.2g} rad, method estimated ({grade['why']})"
+    narrow = f"; narrow {grade['narrow']}" if grade["narrow"] else ""
+    return f"flown, not proven ({grade['why']}{narrow})"

@@ -34,6 +34,9 @@ BOXES = 256
 MOST_DOCKS = 6
 """Docks that open and close, at most: all their combinations are looked at."""
 
+MOST_POINTS = 1000
+"""Communication points at which the bound is given."""
+
 SEGMENTS = 24
 """Parts of the flight, over each of which the largest growth and residual count."""
 
@@ -48,8 +51,9 @@ PAIRS = (*MIXED_PRODUCTS, *SQUARES)
 class ProvenBound:
     """What a law and its method are off by at most, at communication points.
 
-    times    : (n,) [s], communication points
+    times    : (n,) [s], communication points, at most MOST_POINTS of them, the last one among them
     law      : (n,) [rad], of the law alone
+    law_rate : (n,) [rad/s], of the law alone
     whole    : (n,) [rad], of law and method
     rate     : (n,) [rad/s], of law and method
     method   : "remainder", proven, or "estimate", the tolerance taken for the local error of each step
@@ -60,6 +64,7 @@ class ProvenBound:
 
     times: Array
     law: Array
+    law_rate: Array
     whole: Array
     rate: Array
     method: str
@@ -104,18 +109,19 @@ def proven_bound(scene: Scene, duration: float, step: float) -> ProvenBound:
     duration, step : [s], of the flight, of a communication step
     """
     count = max(1, round(duration / step))
-    times: Array = step * np.arange(1, count + 1, dtype=np.float64)
+    points = np.unique(np.rint(np.linspace(1, count, min(count, MOST_POINTS))))
+    times: Array = step * points
     refusal = _refusal(scene)
-    unknown = np.full(count, inf)
+    unknown = np.full(len(times), inf)
     if refusal:
-        return ProvenBound(times, unknown, unknown, unknown, "remainder", inf, inf, refusal)
+        return ProvenBound(times, unknown, unknown, unknown, unknown, "remainder", inf, inf, refusal)
     resolved = resolve(scene)
     found = _suprema(resolved, _ranges(resolved))
     if found is None:
         why = (
             "growth: in its ranges the composite is not shown to have an inertia tensor that can be inverted"
         )
-        return ProvenBound(times, unknown, unknown, unknown, "remainder", inf, inf, why)
+        return ProvenBound(times, unknown, unknown, unknown, unknown, "remainder", inf, inf, why)
     return _flown(scene, found, times, step)
 
 
@@ -407,7 +413,7 @@ def _flown(scene: Scene, found: _Suprema, times: Array, step: float) -> ProvenBo
     start = np.array(scene.rotation.angular_velocity, dtype=float)
     boxes = _rate_boxes(found, start, spans)
     law, whole, method = _Carried(found.rate_share), _Carried(found.rate_share), _method(scene)
-    of_law, of_all, rate = (np.full(len(times), inf) for _ in range(3))
+    of_law, law_rate, of_all, rate = (np.full(len(times), inf) for _ in range(4))
     begun, most = 0.0, [0.0, 0.0]
     for end, span, (low, high) in zip(ends, spans, boxes, strict=True):
         if not np.isfinite(low).all():
@@ -419,7 +425,8 @@ def _flown(scene: Scene, found: _Suprema, times: Array, step: float) -> ProvenBo
         added = _method_sources(scene, found, (low, high), step, method)
         inside = np.flatnonzero((times > begun + 1e-9 * step) & (times <= end * (1 + 1e-12)))
         for i in inside:
-            of_law[i] = law.after(times[i] - begun, growth, found.cubic, residual, 0.0).angle
+            there = law.after(times[i] - begun, growth, found.cubic, residual, 0.0)
+            of_law[i], law_rate[i] = there.angle, there.rate_share * there.energy
             there = whole.after(times[i] - begun, growth, found.cubic, residual + added[1], added[0])
             of_all[i], rate[i] = there.angle, there.rate_share * there.energy
         law = law.after(span, growth, found.cubic, residual, 0.0)
@@ -430,7 +437,7 @@ def _flown(scene: Scene, found: _Suprema, times: Array, step: float) -> ProvenBo
         why = "growth: errors may grow beyond any bound in the ranges"
     elif not isfinite(of_all[-1]):
         why = f"method: steps of {step:g} s turn too far for the remainder"
-    return ProvenBound(times, of_law, of_all, rate, method, most[0], most[1], why)
+    return ProvenBound(times, of_law, law_rate, of_all, rate, method, most[0], most[1], why)
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fmu_build.accuracy.cost import Costs, costs, free_operations, per_step
 from fmu_build.accuracy.flights import apart, body_of, fly, followed, judged
+from fmu_build.accuracy.grades import law_is_off
 from fmu_build.accuracy.histories import Histories, histories
 from fmu_build.flight.choices import (
     BEST,
@@ -189,6 +190,10 @@ class Search:
     def _law(self, model: Model) -> None:
         most_exact = finest(self.scene, model)
         series = most_exact.propagator
+        off = law_is_off(self.scene, self.accuracy, most_exact)
+        if off:
+            self.tried[most_exact] = Tried(most_exact, self.least(most_exact), np.inf, np.inf, "", 0, off)
+            return
         if self.try_one(most_exact).excess(self.accuracy) > 1.0:
             return
         first = self._angle(model)

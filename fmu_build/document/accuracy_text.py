@@ -42,6 +42,10 @@ def _asked_and_found(evidence: Mapping[str, Any]) -> list[tuple[Cell, ...]]:
         ("of the rate [rad/s]", "any" if asked["rate"] is None else asked["rate"]),
         ("up to [s]", asked["horizon"]),
         ("in communication steps of [s]", asked["step"]),
+        ("what it rests on", evidence["grade"]["name"]),
+        ("bound of law and method [rad], [rad/s]", _bounds(evidence["grade"])),
+        ("in the way of a better grade", evidence["grade"]["why"] or "nothing"),
+        ("range whose narrowing helps most", evidence["grade"]["narrow"] or "none"),
         ("margin that flights keep", evidence["margin"]),
         ("chosen", _settings(evidence["choice"])),
         ("its largest error in flight [rad], [rad/s]", (evidence["attitude"], evidence["rate"])),
@@ -51,6 +55,11 @@ def _asked_and_found(evidence: Mapping[str, Any]) -> list[tuple[Cell, ...]]:
         ("steps of each, of which looked at", (evidence["steps"], evidence["looked_at"])),
         ("inputs drawn, of which senseless", (evidence["rows_drawn"], evidence["rows_senseless"])),
     ]
+
+
+def _bounds(grade: Mapping[str, Any]) -> Cell:
+    """Returns the bounds of attitude and rate, or that there are none."""
+    return "none" if grade["attitude"] is None else (grade["attitude"], grade["rate"])
 
 
 def _flown(candidate: Mapping[str, Any]) -> tuple[Cell, ...]:
