@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from math import ceil, floor, log10
 from typing import Any
 
+import numpy as np
+
 from fmu_build.accuracy.flights import LONG
 from fmu_build.accuracy.grades import GRADES, LAW_PROVEN, PROVEN, grade_of
 from fmu_build.accuracy.search import MARGIN, Progress, Search, Tried, begun
@@ -36,6 +38,7 @@ ABOUT = {
     "margin": "least of what is asked over the largest error in flight",
     "doubt": "largest distance of the two ways to the exact motion, in truth",
     "operations": "counted, of a communication step on an average over the flight in which it costs most",
+    "worst": "history of the largest error of what was chosen, and what it holds, null where inputs move",
     "histories": "what inputs do in each flight",
     "steps, looked_at": "communication steps of a flight, and at how many of their ends errors were taken",
     "rows_drawn, rows_senseless": "values of all inputs that were drawn; those that the FMU discards",
@@ -104,6 +107,7 @@ def _chosen(scene: Scene, accuracy: Accuracy, progress: Progress) -> dict[str, A
         "attitude": _brief(best.attitude),
         "rate": _brief(best.rate),
         "operations": _brief(best.operations),
+        "worst": {"history": best.worst, "held": _held(search, best.worst)},
         "histories": [history.name for history in search.every.flown],
         "steps": course.steps,
         "looked_at": len(course.sampled),
@@ -139,7 +143,13 @@ def _is_evidence(kept: Any, scene: Scene, accuracy: Accuracy) -> bool:
     choice = kept["choice"]
     chosen = [one for one in kept["candidates"] if choice.items() <= one.items()]
     Rotation.model_validate(opened | choice)
-    texts = [*kept["histories"], *kept["truth"], *(one["worst"] for one in kept["candidates"])]
+    held = kept["worst"]["held"]
+    texts = [
+        kept["worst"]["history"],
+        *kept["histories"],
+        *kept["truth"],
+        *(one["worst"] for one in kept["candidates"]),
+    ]
     numbers = [kept[name] for name in ("attitude", "rate", "operations", *COUNTS)]
     numbers += [kept["doubt"]["attitude"], kept["doubt"]["rate"]]
     numbers += [one["operations"] for one in (*kept["candidates"], *kept["dearer"])]
@@ -148,6 +158,7 @@ def _is_evidence(kept: Any, scene: Scene, accuracy: Accuracy) -> bool:
     for one in kept["dearer"]:
         Rotation.model_validate({key: value for key, value in one.items() if key != "operations"})
     grade = kept["grade"]
+    numbers += [] if held is None else [*held.values()]
     numbers += [grade[name] for name in ("attitude", "rate", "law") if grade[name] is not None]
     texts += [grade["why"], grade["narrow"]]
     claim = f"{CLAIM} {GRADES[grade['name']]}"
@@ -159,6 +170,16 @@ def _is_evidence(kept: Any, scene: Scene, accuracy: Accuracy) -> bool:
         and are_numbers(numbers)
         and all(isinstance(text, str) for text in texts)
     )
+
+
+def _held(search: Search, name: str) -> dict[str, float] | None:
+    """Returns the inputs that a history holds from the start, None where they move."""
+    every = search.every
+    inputs = next(history.inputs for history in every.flown if history.name == name)
+    if len(inputs.rows) > 1:
+        return None
+    row = np.concatenate([inputs.numbers[0], inputs.booleans[0]])
+    return dict(zip((*every.numbers, *every.docks), (float(value) for value in row), strict=True))
 
 
 def _settings(choice: Choice) -> dict[str, Any]:

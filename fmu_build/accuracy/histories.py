@@ -6,6 +6,7 @@ inside is uniform in the ranges.
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 from math import ceil, pi
 from random import Random
 
@@ -58,6 +59,15 @@ TELLING = ("all high", "corner 1 held", "corner 2 held", "corner, 30 pieces")
 
 WAVES = 3
 """Histories in which what acts goes to and fro."""
+
+TOGETHER = (3, 5, 12, 50, 200)
+"""Communication steps after which everything jumps to the other end of its range, and back."""
+
+MOST_COMBINATIONS = 64
+"""Combinations of docks that are held one by one, at most."""
+
+CLIMBED = 200
+"""Rows that are tried beside the one, of those drawn, in which small disturbances grow fastest."""
 
 MOST_SAMPLES = 1000
 """Communication points at which a flight is looked at, evenly spaced, the last one among them."""
@@ -163,6 +173,7 @@ def histories(scene: Scene, accuracy: Accuracy, judge: Judge, body: Body) -> His
             times = np.unique([0, *(int(random.random() * course.steps) for _ in rows[1:])])
             if len(rows):
                 flown.append(History(f"one input at a time {i}", columns.inputs(times, rows[: len(times)])))
+        flown += _growing(columns, scene, random, np.concatenate([corners, inside[fits[2]]]), judge, body)
         if columns.acting.any():
             starts = (columns.start, *_easiest(columns, corners[:SPUN], body))
             flown += [
@@ -209,6 +220,12 @@ def _fixed(columns: _Columns, random: Random) -> Iterator[tuple[str, Array]]:
     groups = list(dict.fromkeys(columns.groups))
     while len(groups) > MOST_GROUPS:
         del groups[int(random.random() * len(groups))]
+    docks = range(len(columns.numbers), len(columns.low))
+    for flags in product((0.0, 1.0), repeat=len(docks)) if 2 ** len(docks) <= MOST_COMBINATIONS else ():
+        if docks:
+            row = columns.start.copy()
+            row[len(columns.numbers) :] = flags
+            yield f"docks {''.join(str(int(flag)) for flag in flags)}", row
     for group in groups:
         moved = np.array([name == group for name in columns.groups])
         yield f"{group} low", np.where(moved, columns.low, columns.start)
@@ -244,6 +261,41 @@ def _easiest(columns: _Columns, corners: Array, body: Body) -> list[Array]:
     split = len(columns.numbers)
     strength = [np.abs(body(row[:split], row[split:])[1]).sum() for row in corners]
     return [corners[int(np.argmax(strength))]] if strength else []
+
+
+def _growing(  # noqa: PLR0913, PLR0917
+    columns: _Columns, scene: Scene, random: Random, rows: Array, judge: Judge, body: Body
+) -> Iterator[History]:
+    """Yields the history that holds the row in which small disturbances of the start's spin grow fastest.
+
+    Of the rows drawn the best one is moved by steps that shrink, where that is better and makes sense.
+    """
+    split, rate = len(columns.numbers), np.array(scene.rotation.angular_velocity)
+
+    def growth(row: Array) -> float:
+        """Returns the largest growth [1/s] of d' = J^-1 (J w x d' - w x J d'), to six digits."""
+        J = body(row[:split], row[split:])[0]
+        if not np.all(np.isfinite(J)) or np.linalg.eigvalsh(J)[0] <= 0.0:
+            return 0.0
+        linear = np.column_stack([np.cross(J @ rate, d) - np.cross(rate, J @ d) for d in np.eye(3)])
+        return float(f"{np.linalg.eigvals(np.linalg.solve(J, linear)).real.max():.6g}")
+
+    found = [growth(row) for row in rows]
+    if not found or max(found) <= 0.0:
+        return
+    best = kept = rows[int(np.argmax(found))]
+    most = max(found)
+    moving = (columns.high > columns.low) & (np.arange(len(columns.low)) < split)
+    for i in range(CLIMBED):
+        size = 0.3 * 0.96**i * (columns.high - columns.low)
+        tried = best + np.where(moving, size * (2.0 * _drawn(random, 1, columns)[0] - 1.0), 0.0)
+        tried = np.clip(tried, columns.low, columns.high)
+        now = growth(tried)
+        if now > most:
+            best, most = tried, now
+    if not judge(columns.inputs(np.zeros(1, np.int64), best[None]))[0]:
+        best = kept
+    yield History("held where disturbances grow fastest", columns.inputs(np.zeros(1, np.int64), best[None]))
 
 
 def _spun_up(  # noqa: PLR0913, PLR0917
@@ -301,6 +353,12 @@ def _moved(  # noqa: PLR0913, PLR0917
             rows = np.arange(0, steps, stride)
             chosen = [int(random.random() * len(pool)) for _ in rows]
             yield History(f"{what}, at every step", columns.inputs(rows, pool[chosen]))
+    for i, half in enumerate(TOGETHER if len(corners) else ()):
+        rows = np.arange(0, steps, max(half, stride))
+        ends = corners[i % len(corners)], columns.low + columns.high - corners[i % len(corners)]
+        if len(rows) > 1:
+            values = np.where((np.arange(len(rows)) % 2 == 0)[:, None], *ends)
+            yield History(f"all to and fro every {half} steps", columns.inputs(rows, values))
     if not (columns.acting.any() and len(corners)):
         return
     turn = float(np.linalg.norm(scene.rotation.angular_velocity)) * course.size

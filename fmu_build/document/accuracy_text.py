@@ -49,12 +49,20 @@ def _asked_and_found(evidence: Mapping[str, Any]) -> list[tuple[Cell, ...]]:
         ("margin that flights keep", evidence["margin"]),
         ("chosen", _settings(evidence["choice"])),
         ("its largest error in flight [rad], [rad/s]", (evidence["attitude"], evidence["rate"])),
+        ("in the history, which holds", _worst(evidence["worst"])),
         ("the exact motion is known to [rad], [rad/s]", tuple(evidence["doubt"].values())),
         ("by two ways", "; ".join(evidence["truth"])),
         ("flights", f"{len(evidence['histories'])}: {'; '.join(evidence['histories'])}"),
         ("steps of each, of which looked at", (evidence["steps"], evidence["looked_at"])),
         ("inputs drawn, of which senseless", (evidence["rows_drawn"], evidence["rows_senseless"])),
     ]
+
+
+def _worst(worst: Mapping[str, Any]) -> str:
+    """Returns the worst history, and the inputs that it holds."""
+    held = worst["held"]
+    inputs = "inputs that move" if held is None else ", ".join(f"{k} {v:.6g}" for k, v in held.items())
+    return f"{worst['history']}: {inputs or 'no inputs'}"
 
 
 def _bounds(grade: Mapping[str, Any]) -> Cell:

@@ -297,7 +297,7 @@ def test_the_command_says_in_a_line_what_it_has_chosen(tmp_path, capsys, monkeyp
     assert main(["spin.toml"]) == 0
     out, error = capsys.readouterr()
     assert out.splitlines()[0].startswith(
-        'law = "none", propagator = "rk4", max_angle_step = 0.011: largest error'
+        'law = "none", propagator = "rk4", max_angle_step = 0.011: proven within '
     )
     assert (out.splitlines()[1:], error) == (["spin.fmu"], "")
     (tmp_path / "spin.toml").write_text(

@@ -3,13 +3,18 @@
 from contextlib import suppress
 from typing import Any
 
+import numpy as np
 import pytest
 
 from fmu_build.accuracy import said
+from fmu_build.accuracy.flights import body_of
 from fmu_build.accuracy.grades import FLOWN, GRADES, PROVEN, law_is_off
+from fmu_build.accuracy.histories import Histories, histories
 from fmu_build.flight.choices import Choice, Model
 from supervessel import choose, parse_scene
+from supervessel.equations import equations
 from supervessel.problems import AccuracyError
+from supervessel.scene.schema import without_accuracy
 
 CENTRE = {"position": [0.0, 0.0, 0.0], "direction": [1.0, 0.0, 0.0], "alignment": [0.0, 1.0, 0.0]}
 BACK = CENTRE | {"direction": [-1.0, 0.0, 0.0]}
@@ -91,6 +96,8 @@ def test_a_law_is_not_chosen_where_it_fails_in_a_small_part_of_the_ranges(case: 
         assert chosen.rotation.law == "tensor"
         assert evidence["grade"]["name"] == FLOWN
         assert evidence["grade"]["narrow"] in moved
+        name = "docks 11110" if case is by_docks else "held where disturbances grow fastest"
+        assert name in evidence["histories"]
 
 
 def asked(attitude: float) -> dict[str, Any]:
@@ -121,3 +128,30 @@ def test_slow_flight_is_proven_and_says_so() -> None:
         assert evidence["attitude"] <= grade["attitude"] <= attitude
         assert f"proven within {grade['attitude']:.2g} rad" in said(evidence)
         assert evidence["claim"].endswith(GRADES[PROVEN])
+
+
+def flown_names(raw: dict[str, Any]) -> Histories:
+    scene = parse_scene(raw)
+    assert scene.accuracy is not None
+    built = equations(without_accuracy(scene))
+    return histories(
+        scene, scene.accuracy, lambda inputs: np.ones(len(inputs.rows), bool), body_of(scene, built)
+    )
+
+
+def test_flights_hold_the_row_that_grows_fastest() -> None:
+    """In case (a) that is inside the one part in a hundred of the range that is unstable."""
+    every = flown_names(by_mass())
+    held = next(h for h in every.flown if h.name == "held where disturbances grow fastest")
+    assert 500.0 < held.inputs.numbers[0, 0] < 510.0
+    assert np.isclose(held.inputs.numbers[0, 0], 505.0, atol=0.5)
+
+
+def test_masses_and_torques_jump_together_every_three_to_two_hundred_steps() -> None:
+    raw = asked(0.1)
+    raw["accuracy"]["horizon"] = 1000.0
+    every = flown_names(raw)
+    for half in (3, 5, 12, 50, 200):
+        inputs = next(h.inputs for h in every.flown if h.name == f"all to and fro every {half} steps")
+        assert set(np.diff(inputs.rows)) == {half}
+        assert np.all(np.diff(inputs.numbers, axis=0) != 0.0)  # each input at each jump
