@@ -173,6 +173,7 @@ def histories(scene: Scene, accuracy: Accuracy, judge: Judge, body: Body) -> His
             times = np.unique([0, *(int(random.random() * course.steps) for _ in rows[1:])])
             if len(rows):
                 flown.append(History(f"one input at a time {i}", columns.inputs(times, rows[: len(times)])))
+        flown += _together(columns, course, corners, judge)
         flown += _growing(columns, scene, random, np.concatenate([corners, inside[fits[2]]]), judge, body)
         if columns.acting.any():
             starts = (columns.start, *_easiest(columns, corners[:SPUN], body))
@@ -261,6 +262,21 @@ def _easiest(columns: _Columns, corners: Array, body: Body) -> list[Array]:
     split = len(columns.numbers)
     strength = [np.abs(body(row[:split], row[split:])[1]).sum() for row in corners]
     return [corners[int(np.argmax(strength))]] if strength else []
+
+
+def _together(columns: _Columns, course: Course, corners: Array, judge: Judge) -> Iterator[History]:
+    """Yields histories in which everything jumps to the opposite corner and back, if both make sense."""
+    here = corners[:SPUN]
+    there = np.where(here == columns.low, columns.high, columns.low)
+    fits = judge(columns.inputs(np.arange(len(here)), there)) if len(here) else np.zeros(0, dtype=bool)
+    here, there = here[fits], there[fits]
+    stride = ceil(course.steps * len(columns.low) / MOST_NUMBERS)
+    for i, half in enumerate(TOGETHER if len(here) else ()):
+        rows = np.arange(0, course.steps, max(half, stride))
+        if len(rows) > 1:
+            ends = here[i % len(here)], there[i % len(here)]
+            values = np.where((np.arange(len(rows)) % 2 == 0)[:, None], *ends)
+            yield History(f"all to and fro every {half} steps", columns.inputs(rows, values))
 
 
 def _growing(  # noqa: PLR0913, PLR0917
@@ -353,12 +369,6 @@ def _moved(  # noqa: PLR0913, PLR0917
             rows = np.arange(0, steps, stride)
             chosen = [int(random.random() * len(pool)) for _ in rows]
             yield History(f"{what}, at every step", columns.inputs(rows, pool[chosen]))
-    for i, half in enumerate(TOGETHER if len(corners) else ()):
-        rows = np.arange(0, steps, max(half, stride))
-        ends = corners[i % len(corners)], columns.low + columns.high - corners[i % len(corners)]
-        if len(rows) > 1:
-            values = np.where((np.arange(len(rows)) % 2 == 0)[:, None], *ends)
-            yield History(f"all to and fro every {half} steps", columns.inputs(rows, values))
     if not (columns.acting.any() and len(corners)):
         return
     turn = float(np.linalg.norm(scene.rotation.angular_velocity)) * course.size

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fmu_build.accuracy import proven
+from fmu_build.accuracy import proven, range_suprema
 from fmu_build.accuracy.intervals import boxes_of, over_boxes
 from fmu_build.accuracy.proven import proven_bound, to_narrow
 from supervessel import Scene, Twin, parse_scene
@@ -196,7 +196,7 @@ def test_boxes_cover_a_range_and_no_more() -> None:
 def test_what_the_code_cites_is_on_the_page() -> None:
     page = (ROOT / "model" / "docs" / "error_bound.md").read_text(encoding="utf-8")
     tags = {int(number) for number in re.findall(r"\\tag\{(\d+)\}", page)}
-    text = Path(proven.__file__).read_text(encoding="utf-8")
+    text = "".join(Path(m.__file__).read_text(encoding="utf-8") for m in (proven, range_suprema))
     cited = re.findall(r"\[EB\]\s+eqs?\.((?:(?:\s|,|to|and)*\(\d+\))+)", text)
     numbers = {int(number) for group in cited for number in re.findall(r"\d+", group)}
     assert len(numbers) > 4
