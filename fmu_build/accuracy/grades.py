@@ -63,7 +63,8 @@ def grade_of(scene: Scene, accuracy: Accuracy, choice: Choice) -> Grade:
     if not why and (within or choice.model.law != "tensor"):
         beyond = "" if bound.method == "estimate" else f": its remainder leaves {whole:.2g} rad"
         return Grade(LAW_PROVEN, known[0], known[1], known[2], f"method: {choice.propagator}{beyond}", "")
-    why = why or f"growth: steps of the method leave {whole:.2g} rad, carried by growth over the ranges"
+    if not why:
+        why = f"method: its steps are bounded by {whole:.2g} rad over the ranges only"
     return Grade(FLOWN, known[0], known[1], known[2], why, to_narrow(flown, accuracy.horizon, accuracy.step))
 
 

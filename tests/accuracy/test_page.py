@@ -25,7 +25,9 @@ def row(attitude):
     choice = evidence["choice"]
     values = [f"`{choice['law']}`", f"`{choice['propagator']}`"]
     values += [f"{key} {choice[key]:g}" for key in ("tolerance", "max_angle_step") if key in choice]
-    cells = f"{attitude:g}", ", ".join(values), f"{evidence['operations']:g}", f"{evidence['attitude']:.1e}"
+    grade = evidence["grade"]
+    cells = [f"{attitude:g}", ", ".join(values), f"{evidence['operations']:g}", f"{evidence['attitude']:.1e}"]
+    cells += [grade["name"], f"{grade['attitude']:.2g}"]
     return f"| {' | '.join(cells)} |"
 
 
