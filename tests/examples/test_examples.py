@@ -98,6 +98,7 @@ def test_the_readme_and_its_pages_have_the_blocks_that_they_had():
     assert {page for page, _ in PYTHON_BLOCKS} == {
         "README.md",
         "fmu_build/docs/fmu.md",
+        "model/docs/error_bound.md",
         "model/docs/orbiter.md",
         "model/docs/twin.md",
     }
