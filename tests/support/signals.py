@@ -188,7 +188,7 @@ def end(case: Case, folder: Path, number: int, delay: float, cache: Path | None 
     given = set(work.rglob("*"))
     places = {"TMPDIR": temporary} | ({} if cache is None else {"SUPERVESSEL_CACHE": cache})
     running = begin(case.words, work, **places)
-    wait_for(lambda: running.poll() is not None or catches(running.pid, signal.SIGHUP), 0.5)
+    wait_for(lambda: running.poll() is not None or catches(running.pid, signal.SIGHUP), 30.0)
     told = not wait_for(lambda: running.poll() is not None, delay)
     start = time.perf_counter()
     running.send_signal(number)

@@ -14,14 +14,12 @@ from pathlib import Path
 
 import pytest
 
+from fmu_build.storage.compiler_files import FOLDER
 from model.test_commands_end import assert_ended
 from support.processes import ROOT
 from support.signals import CASES, ROW, end, needs_linux
 
 pytestmark = [pytest.mark.surroundings, needs_linux]
-
-PARTS = ("b", "h", "o", "tmp", "z")
-"""Folders of a cache that are the compiler's own."""
 
 LAST = 60
 """Moments that are tried, if a command takes that long."""
@@ -59,7 +57,7 @@ def half_written(cache):
     """Returns what a cache holds that is neither whole nor the compiler's."""
     found = []
     for folder, folders, files in os.walk(cache):
-        folders[:] = [name for name in folders if name not in PARTS]
+        folders[:] = [name for name in folders if name != FOLDER]
         found += [Path(folder, name) for name in (*files, *folders) if name.startswith((".", "tmp"))]
     return found
 
