@@ -149,6 +149,7 @@ def test_each_function_survives_saving(twin: Twin, name: str) -> None:
         "e": 0.1 * rng.normal(size=6),
         "acceleration_ref": rng.normal(size=3),
         "p_next": 1.01 * twin.p_start,
+        "bound": [1e-3, 1e-2],
     }
     arguments = [at[argument] for argument in function.name_in()]
     values = [numbers(v).tolist() for v in (again.call(arguments), function.call(arguments)) for v in v]
