@@ -72,6 +72,11 @@ def test_a_cache_on_a_full_disk_is_told_in_words(place, small):
 def test_temporary_files_on_a_full_disk_are_told_in_words(place, small, words):
     done = run(words, place, {"TMPDIR": str(small)})
     assert list(small.iterdir()) == []
+    if done.error.startswith("no plot: "):  # tables and figures are there all the same
+        assert_clean(done, place)
+        assert (done.status, done.error.count("\n")) == (0, 1), done
+        assert set(done.made) == {name for name in MADE[words] if not name.endswith((".png", ".svg"))}
+        return
     right_or_refused(done, place, words)
 
 
