@@ -38,6 +38,8 @@ TRIAL_FLAGS = (*(flag for flag in FLAGS if flag != "-O2"), "-O0", "-fno-sanitize
 """For libraries that are flown a few times: compiled in a fifth of the time, the same numbers."""
 
 
+TOO_LONG = "did not end within"
+
 NEEDED = ("SYSTEMROOT", "TEMP", "TMP") if os.name == "nt" else ()
 """Variables that compilers get from the user's surroundings: without them Windows starts no program."""
 
@@ -154,7 +156,8 @@ def _compiled(
     """Returns the library of that file name. It is made in the cache, whose path the linker can work with.
 
     files : by relative path, are there for the compiler, which reads relative sources among them
-    A compiler that fails where its own files have changed is started again, with new ones.
+    A compiler that fails where its own files have changed, or with a problem that is not in our sources, is
+    started again, with new files of its own.
     """
     for source in sources:
         if set("\n\r") & set(str(source)):
@@ -171,7 +174,7 @@ def _compiled(
     try:
         kept = compiler_folder()
         made, problem = _made(command, name, kept, files or {})
-        if made is None and is_changed(kept):
+        if made is None and (is_changed(kept) or not _is_of_ours(problem, sources)):
             made, problem = _made(command, name, renewed(kept), files or {})
     except OSError as error:
         place = error.filename or cache
@@ -179,6 +182,11 @@ def _compiled(
     if made is None:
         raise BuildError(f"compiler for {platform.name} {problem}")
     return made
+
+
+def _is_of_ours(problem: str, sources: Sequence[Path]) -> bool:
+    """Whether a compiler's words are about our sources, or about its having taken too long."""
+    return problem.startswith(TOO_LONG) or any(f"{source}:" in problem for source in sources)
 
 
 def _made(
@@ -212,7 +220,7 @@ def _run(command: Sequence[str], folder: Path, kept: Path) -> str | None:
     try:
         done = run(command, TIME_LIMIT, folder, environment(kept, folder / "objects"))
     except subprocess.TimeoutExpired:
-        return f"did not end within {TIME_LIMIT:g} s.\n{kept_in}"
+        return f"{TOO_LONG} {TIME_LIMIT:g} s.\n{kept_in}"
     if done.returncode == 0:
         return None
     return f"failed:\n{(done.stderr or done.stdout).strip()}\n{kept_in}"

@@ -27,6 +27,7 @@ from pathlib import Path
 from fmu_build.errors import BuildError
 from fmu_build.storage.temporary import (
     folder_of_program,
+    is_locked,
     is_own,
     is_own_folder,
     lock,
@@ -272,7 +273,7 @@ def is_in_use(generation: Path) -> bool:
     if file is None:
         return False
     try:
-        return not lock(file)
+        return is_locked(file)
     finally:
         os.close(file)
 

@@ -45,9 +45,12 @@ def _was_changed(folder: Path) -> bool:
 
 
 def is_changed(folder: Path) -> bool:
-    """Whether a file that has been recorded in the compiler's folder is gone or is another."""
+    """Whether a file that has been recorded in the compiler's folder is gone or is another.
+
+    So it is where there are files and no record, unless a compiler is at work: it is recorded when it ends.
+    """
     if not os.path.lexists(folder.with_name(RECORD)):
-        return False
+        return any(folder.iterdir()) and not is_in_use(folder.parent)
     recorded = _recorded(folder)
     return recorded is None or any(_digest(folder / name) != digest for name, digest in recorded.items())
 

@@ -4,6 +4,7 @@ Each folder holds a file that its process keeps locked: if the lock is free, the
 """
 
 import atexit
+import errno
 import functools
 import os
 import shutil
@@ -25,6 +26,8 @@ LOCK = ".supervessel-lock"
 
 SIGNATURE = b"supervessel: this folder is removed when the process that has locked this file has ended\n"
 """Content of the lock file, written once the file is locked; a folder whose file lacks it is being made."""
+
+LOCKED_BY_ANOTHER = (errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES, errno.EDEADLK)
 
 LOCKED_BYTE = 1024
 """Offset of the locked byte, behind the content: on Windows others cannot read locked bytes."""
@@ -114,16 +117,31 @@ def is_own(status: os.stat_result) -> bool:
 
 
 def lock(file: int, *, shared: bool = False) -> bool:
-    """Locks a file until it is closed or the process ends; returns False if another process has locked it.
+    """Locks a file until it is closed, or its process ends; returns whether it is then locked so.
 
-    shared : whether others may have a shared lock at the same time (on Windows they may not)
+    shared : others may lock it so at the same time (on Windows nobody else may)
+    It is not where another has locked it, or where the file system has no locks, as some network drives.
     """
     try:
-        if sys.platform == "win32":
-            os.lseek(file, LOCKED_BYTE, os.SEEK_SET)
-            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
-        else:
-            fcntl.flock(file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+        _lock(file, shared=shared)
     except OSError:
         return False
     return True
+
+
+def is_locked(file: int) -> bool:
+    """Whether another has locked a file, which is locked if not; no, where the file system has no locks."""
+    try:
+        _lock(file, shared=False)
+    except OSError as error:
+        return error.errno in LOCKED_BY_ANOTHER
+    return False
+
+
+def _lock(file: int, *, shared: bool) -> None:
+    """Locks a file, or raises OSError at once."""
+    if sys.platform == "win32":
+        os.lseek(file, LOCKED_BYTE, os.SEEK_SET)
+        msvcrt.locking(file, msvcrt.LK_NBLCK, 1)
+    else:
+        fcntl.flock(file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)

@@ -1,5 +1,6 @@
 """The cache: nothing of a user's is touched, nothing that others could have written is taken for ours."""
 
+import errno
 import json
 import os
 import shutil
@@ -542,11 +543,41 @@ def test_what_the_compiler_has_kept_for_itself_is_not_believed_where_it_has_chan
     assert cache_folder() == base / OURS / "generation-2"
 
 
-def test_a_record_that_has_been_damaged_is_not_believed(generation, compiled):
+def test_a_record_that_has_been_damaged_or_is_gone_is_not_believed(generation, compiled):
     compiled()
-    record = generation / RECORD
+    record, folder = generation / RECORD, generation / FOLDER
     record.write_bytes(record.read_bytes()[:-1])
-    assert compiler_files.is_changed(generation / FOLDER)
+    assert compiler_files.is_changed(folder)
+    record.unlink()
+    assert compiler_files.is_changed(folder)
+    with caches.in_use(generation):  # what a compiler at work makes is recorded when it ends
+        assert not compiler_files.is_changed(folder)
+
+
+@needs_posix
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
+def test_where_a_file_system_has_no_locks_the_compilers_files_are_recorded_and_a_cache_cleared(
+    generation, compiled, monkeypatch, capsys, number
+):
+    def no_locks(file, kind):
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(temporary.fcntl, "flock", no_locks)
+    compiled()
+    assert (generation / RECORD).exists()
+    assert main(["cache", "--clear"]) == 0
+    assert capsys.readouterr().out.startswith("removed: ")
+
+
+def test_a_compiler_whose_manifests_lead_nowhere_is_started_again_with_new_files(generation, compiled):
+    """Its files are as recorded, but a manifest names others: it fails, and not because of our sources."""
+    first = compiled()
+    shutil.rmtree(generation / "libraries")
+    shutil.rmtree(generation / FOLDER / "o")
+    compiler_files.record(generation / FOLDER)
+    compiler_files._was_changed.cache_clear()
+    assert compiled() == first
+    assert cache_folder() != generation
 
 
 def test_a_cache_in_use_is_not_cleared_and_a_clear_leaves_nothing(base, generation, capsys):

@@ -15,7 +15,7 @@ import pytest
 from fmu_build.errors import BuildError
 from supervessel import Twin, reference
 from supervessel.twin.twin import FUNCTIONS
-from support import ISS_DG, TURNING, Array, U, body, relative_error, scene, variant
+from support import ISS_DG, NAN, TURNING, Array, U, body, relative_error, scene, variant
 from support.processes import ROOT
 from twin.scenes import numbers
 
@@ -154,6 +154,25 @@ def test_each_function_survives_saving(twin: Twin, name: str) -> None:
     arguments = [at[argument] for argument in function.name_in()]
     values = [numbers(v).tolist() for v in (again.call(arguments), function.call(arguments)) for v in v]
     assert values[: len(values) // 2] == values[len(values) // 2 :]
+
+
+@pytest.mark.parametrize(
+    ("bound", "h", "words"),
+    [
+        ([0.0, -1.0], H, r"error_bound: bound = \[0\.0, -1\.0\]: must be >= 0"),
+        ([NAN, 0.0], H, r"error_bound: bound = \[nan, 0\.0\]: must be >= 0"),
+        ([0.0, 0.0], -H, r"error_bound: h = .*: must be > 0"),
+        ([0.0, 0.0], 0.0, r"error_bound: h = .*: must be > 0"),
+    ],
+)
+def test_what_is_no_bound_and_steps_back_are_refused(twin: Twin, bound: Any, h: float, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        twin.error_bound(twin.x_start, bound, TORQUE, twin.p_start, h)
+
+
+def test_a_bound_that_is_infinite_stays_infinite(twin: Twin) -> None:
+    bound = twin.error_bound(twin.x_start, [np.inf, np.inf], TORQUE, twin.p_start, H)
+    assert numbers(bound).ravel().tolist() == [np.inf, np.inf]
 
 
 # Fixed inputs, many steps

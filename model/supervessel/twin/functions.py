@@ -16,6 +16,9 @@ UNIT_SLACK = 1e-3
 STATES = ("x", "x_ref")
 """Arguments whose first four elements are an attitude."""
 
+BOUND = "bound"
+"""The argument that is a bound of an error: not negative, infinite where none is known."""
+
 SYMBOLS = (ca.SX, ca.MX)
 
 
@@ -162,8 +165,14 @@ class TwinFunction(ca.Function):
             raise ValueError(f"{self.name()}: {name} holds {_size(shape)}: {wanted}")
         if symbolic:
             return value
-        if not np.isfinite(array).all():
+        if name == BOUND:
+            if not (array >= 0.0).all():
+                said = f"{self.name()}: {name} = {array.ravel().tolist()}"
+                raise ValueError(f"{said}: must be >= 0, inf where no bound is known")
+        elif not np.isfinite(array).all():
             raise ValueError(f"{self.name()}: {name} = {array.ravel().tolist()}: must be finite")
+        if name == "h" and BOUND in self._sizes and not (array > 0.0).all():
+            raise ValueError(f"{self.name()}: h = {array.ravel().tolist()}: must be > 0: bounds only grow")
         if self._unit and name in STATES:
             self._check_attitudes(name, array.reshape(shape if fits else (rows, columns)))
         if not array.size:
