@@ -43,7 +43,8 @@ static double listen(Instance *instance, double end) {
     const bool wanted = instance->sub_step_ended(instance, &early);
     instance->within_step = false;
     if (instance->now.state == INTERMEDIATE) instance->now.state = STEPPING;
-    if (!wanted || !instance->early_return_allowed || !(early < end)) return end;
+    /* isless, unlike <, raises no floating-point exception for a NaN */
+    if (!wanted || !instance->early_return_allowed || !isless(early, end)) return end;
     return larger(early, instance->now.values[REFERENCE_TIME]);
 }
 
