@@ -106,6 +106,14 @@ def _thin_libraries(
     return libraries
 
 
+def lay_out(files: Mapping[str, bytes], folder: Path) -> None:
+    """Writes files, by relative path, into a new folder, for a compiler to read."""
+    for path, content in files.items():
+        file = folder / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(content)
+
+
 def digest_of(files: Mapping[str, bytes]) -> str:
     """Returns what stands for files, by path, and their contents."""
     digest = sha256()
@@ -199,10 +207,7 @@ def _made(
     """
     generation = kept.parent
     with in_use(generation), tempfile.TemporaryDirectory(dir=generation, prefix="made-") as folder:
-        for path, content in files.items():
-            file = Path(folder, path)
-            file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_bytes(content)
+        lay_out(files, Path(folder))
         problem = _run(command, Path(folder), kept)
         count_compilation(generation)
         made = Path(folder, name).read_bytes() if problem is None else None

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import casadi as ca
 
-from fmu_build.compile.compiler import FLAGS, compile_library, digest_of
+from fmu_build.compile.compiler import FLAGS, compile_library, digest_of, lay_out
 from fmu_build.errors import BuildError
 from fmu_build.generate.equations_source import generated_c
 from fmu_build.generate.model import generate as scene_sources
@@ -88,10 +88,7 @@ def _compiled(
         flags = (*flags, "-Wl,-z,defs")
     if not library.exists():
         with tempfile.TemporaryDirectory(dir=folder) as made:
-            for path, text in files.items():
-                file = Path(made, path)
-                file.parent.mkdir(exist_ok=True)
-                file.write_bytes(text)
+            lay_out(files, Path(made))
             part = Path(made, library.name)
             compile_library([Path(made, main)], platform, part, (*FLAGS, *flags))
             part.replace(library)

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import fmu_build.compile.library
-from fmu_build.compile.compiler import fmi_headers
+from fmu_build.compile.compiler import fmi_headers, lay_out
 from fmu_build.platforms import Platform
 
 FLAGS = ("-std=c99", "-O1", "-g", "-w", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
@@ -35,10 +35,7 @@ def compile_binaries(  # noqa: PLR0917
     command = [os.environ["SANITIZING_COMPILER"], *FLAGS, *SANITIZERS, "-isystem", str(fmi_headers())]
     environment = {key: value for key, value in os.environ.items() if key != "LD_PRELOAD"}
     with tempfile.TemporaryDirectory(prefix="supervessel-sanitized-") as folder:
-        for path, content in files.items():
-            file = Path(folder, path)
-            file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_bytes(content)
+        lay_out(files, Path(folder))
         subprocess.run([*command, "-o", name, main, "-lm"], cwd=folder, env=environment, check=True)
         with Path(os.environ["SANITIZED_LIBRARIES"]).open("a", encoding="utf-8") as made:
             made.write(f"{name}\n")
