@@ -25,7 +25,7 @@ from fmu_build.storage.cache import FULL, LARGEST, OURS, TAG, TAG_TEXT, USED, ca
 from fmu_build.storage.compiler_files import FOLDER, RECORD
 from fmu_build.storage.temporary import temporary_folder
 from supervessel.__main__ import main
-from support import body, scene
+from support import body, processes, scene
 from support.processes import ROOT, needs_posix
 
 SCENE = 'name = "ball"\nroot = "B"\n[vessels.B]\nmass = 2.0\npmi = [1.0, 1.5, 2.0]\n'
@@ -552,6 +552,26 @@ def test_a_record_that_has_been_damaged_or_is_gone_is_not_believed(generation, c
     assert compiler_files.is_changed(folder)
     with caches.in_use(generation):  # what a compiler at work makes is recorded when it ends
         assert not compiler_files.is_changed(folder)
+
+
+def test_a_tests_cache_is_whole_though_another_worker_compiles_while_it_is_begun(tmp_path, monkeypatch):
+    common = tmp_path / "common" / FOLDER
+    common.mkdir(parents=True)
+    (common / "first").mkdir()
+    (common / "first" / "libm.o").write_bytes(b"1")
+    compiler_files.record(common)
+
+    def goes_on(file, new, *, linked):
+        shutil.copy2(file, new)
+        (common / "another").mkdir(exist_ok=True)
+        (common / "another" / "libm.o").write_bytes(b"2")
+        compiler_files.record(common)
+
+    monkeypatch.setattr(processes, "_warm", lambda: common)
+    monkeypatch.setattr(processes, "_give", goes_on)
+    begun = tmp_path / "begun"
+    processes.begin_cache(begun)
+    assert not compiler_files.is_changed(processes.kept_in(begun) / FOLDER)
 
 
 @needs_posix

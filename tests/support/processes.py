@@ -21,7 +21,7 @@ import pytest
 from fmu_build.compile.compiler import FLAGS, TRIAL_FLAGS, compile_library
 from fmu_build.platforms import host_platform
 from fmu_build.storage.cache import OURS, cache_folder
-from fmu_build.storage.compiler_files import FOLDER, MANIFESTS, RECORD, UNFINISHED, compiler_folder
+from fmu_build.storage.compiler_files import FOLDER, MANIFESTS, RECORD, UNFINISHED, compiler_folder, record
 from support.pages import ROOT
 
 needs_posix = pytest.mark.skipif(os.name != "posix", reason="needs signals and ulimit")
@@ -71,6 +71,8 @@ def begin_cache(cache: Path) -> None:
         patch.setenv("SUPERVESSEL_CACHE", str(cache))
         own = cache_folder()
     assert own == kept_in(cache)
+    with suppress(FileNotFoundError):  # before what it lists: another worker's compiler goes on
+        shutil.copy2(common.with_name(RECORD), own / RECORD)
     for kind in (MANIFESTS, *sorted({path.name for path in common.iterdir()} - {MANIFESTS, UNFINISHED})):
         for place, _, names in os.walk(common / kind):
             new = own / FOLDER / Path(place).relative_to(common)
@@ -78,8 +80,8 @@ def begin_cache(cache: Path) -> None:
             for name in names:
                 with suppress(FileNotFoundError):  # of another worker's compiler, which goes on
                     _give(Path(place, name), new / name, linked=kind != MANIFESTS)
-    if common.with_name(RECORD).exists():  # not while another worker compiles
-        shutil.copy2(common.with_name(RECORD), own / RECORD)
+    if not (own / RECORD).exists():  # the first compilers of all are still at work
+        record(own / FOLDER)
 
 
 def _give(file: Path, new: Path, *, linked: bool) -> None:
