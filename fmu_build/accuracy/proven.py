@@ -24,8 +24,9 @@ from fmu_build.accuracy.range_suprema import (
     residual_over,
 )
 from supervessel.composite.resolved import resolve
+from supervessel.rotation.error_bound.constants import LEAST_COUPLING
+from supervessel.rotation.error_bound.remainder import DEPTH, remainder_of
 from supervessel.rotation.laws import LAWS
-from supervessel.rotation.step_remainder import DEPTH, LEAST_COUPLING, remainder_of
 from supervessel.scene.numbers import EPSILON
 from supervessel.scene.schema import Scene
 
@@ -252,13 +253,15 @@ def _method_sources(
     z = coupling * v * step
     if z > constants.limit:
         return inf, inf
-    power = z**constants.power
+    power = float(z**constants.power)
     fastest = float(np.linalg.norm(fastest_change(found, *box)))
     angle = scene.rotation.max_angle_step  # as many sub-steps as `fastest_square` asks for
     sub_steps = 1 + ceil(step * sqrt(1.5 * speed * speed + 3.0 * angle * fastest) / angle)
     rounding = 0.5 * EPSILON * (4.0 * speed * sub_steps + DEPTH * step * fastest)
     rate = constants.rate * v * power * bool(LAWS[scene.rotation.law].products) + rounding
     turn = pi * (
-        constants.turn * power + 0.5 * EPSILON * (8.0 * sub_steps + DEPTH * step * speed) + 0.5 * step * rate
+        float(constants.turn) * power
+        + 0.5 * EPSILON * (8.0 * sub_steps + DEPTH * step * speed)
+        + 0.5 * step * rate
     )
     return turn / step * SLACK, found.heaviest * rate / step * SLACK

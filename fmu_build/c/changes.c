@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "docks.h"
+#include "error_bound.h"
 #include "exchange_state.h"
 #include "kept_in_changes.h"
 
@@ -84,7 +85,9 @@ Status changes_apply(Instance *instance, const double p[], const double c[]) {
 void changes_commit(Instance *instance) {
     Dynamics *now = &instance->now;
     changes_mirror(instance);
+    if (changes_state(instance) == EVENT) bound_over_change(instance);
     begin_from_now(now);
+    bound_remember(instance);
     memcpy(now->kept_rate, instance_x(instance) + 4, sizeof now->kept_rate);
     exchange_commit(instance);
 }

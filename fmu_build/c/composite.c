@@ -158,12 +158,13 @@ void composite_compute(Instance *instance, const double p[], double c[]) {
     composite(instance->arg, instance->res, instance->iw, instance->w, 0);
 }
 
-/* Whether products of a few numbers of inputs and composite, and quotients by mass and moments, are doubles. */
-static bool makes_ordinary(const double p[], const double c[]) {
-    static const double least = 0x1p-150;
-    bool ordinary = are_ordinary(p, INPUT_P_COUNT) && are_ordinary(c, COMPOSITE_COUNT) && c[COMPOSITE_MASS] >= least;
-    for (size_t i = COMPOSITE_MARGINS; i < COMPOSITE_LAW && LAW_TURNS; i++) ordinary = ordinary && c[i] >= least;
-    return ordinary;
+/* Whether inputs and composite are of a size up to the limit, and mass and moments as far from zero. */
+static bool are_all_within(const double p[], const double c[], double limit) {
+    const double least = 1.0 / limit;
+    bool within = are_within(p, INPUT_P_COUNT, limit) && are_within(c, COMPOSITE_COUNT, limit);
+    within = within && c[COMPOSITE_MASS] >= least;
+    for (size_t i = COMPOSITE_MARGINS; i < COMPOSITE_LAW && LAW_TURNS; i++) within = within && c[i] >= least;
+    return within;
 }
 
 Status composite_refresh(Instance *instance) {
@@ -183,7 +184,8 @@ Status composite_refresh(Instance *instance) {
     if (status == STATUS_OK) status = changes_apply(instance, p, c);
     if (status != STATUS_OK) return status;
     now->composite_is_current = true;
-    now->composite_is_ordinary = makes_ordinary(now->p, now->c);
+    now->composite_is_ordinary = are_all_within(now->p, now->c, ORDINARY);
+    if (ERROR_BOUND) now->composite_is_tame = are_all_within(now->p, now->c, TAME);
     now->axes_are_current = false;
     instance->outputs_are_current = instance->rates_are_current = false;
     instance_inform(instance, LOG_COMPOSITE, "composite computed at %.10g s: mass = %.10g kg",

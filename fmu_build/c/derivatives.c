@@ -67,8 +67,8 @@ static bool derives_ordinary(Instance *instance, const double seed[], size_t cou
     const bool long_enough = fmax(fmax(fabs(s[0]), fabs(s[1])), fmax(fabs(s[2]), fabs(s[3]))) >= 0x1p-150;
     const double *p = instance->now.p, *set = &instance->now.values[REFERENCE_P];
     const bool scaled = memcmp(p, set, INPUT_P_COUNT * sizeof(double)) != 0;
-    return instance_is_ordinary(instance) && are_ordinary(seed, count) && !scaled &&
-           (!at_start || (are_ordinary(s, 4) && long_enough));
+    return instance_is_ordinary(instance) && are_within(seed, count, ORDINARY) && !scaled &&
+           (!at_start || (are_within(s, 4, ORDINARY) && long_enough));
 }
 
 /* Applies the derivative of q = s/|s| to a vector in place; it is symmetric, so it serves both ways. */
@@ -219,7 +219,7 @@ Status derivatives_of_time(Instance *instance, const unsigned references[], size
     Variation *v = &instance->scratch.variation;
     memset(v, 0, sizeof *v);
     memcpy(v->x, rates, sizeof rates);
-    respond(instance, instance_is_ordinary(instance) && are_ordinary(v->x, STATE_COUNT));
+    respond(instance, instance_is_ordinary(instance) && are_within(v->x, STATE_COUNT, ORDINARY));
     for (size_t i = 0; i < count; i++) values[i] = v->y[references[i] - REFERENCE_OUTPUTS];
     return check_results(instance, references, count, values);
 }

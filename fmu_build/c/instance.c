@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "changes.h"
+#include "error_bound.h"
 #include "variables.h"
 
 enum { MESSAGE_SIZE = 1024, LONGEST_NAME = 200 };
@@ -24,6 +25,9 @@ static const struct {
     {LOG_NAME_DISCARD, LOG_DISCARD},
     {LOG_NAME_ERROR, LOG_ERROR},
     {LOG_NAME_COMPOSITE, LOG_COMPOSITE},
+#if ACCURACY_ASKED
+    {LOG_NAME_ACCURACY, LOG_ACCURACY},
+#endif
     {LOG_NAME_ALL, LOG_ALL},
 };
 
@@ -74,11 +78,13 @@ void instance_reset(Instance *instance) {
     memset(&instance->now, 0, sizeof instance->now);
     instance->now.state = INSTANTIATED;
     instance->now.model_exchange = model_exchange;
+    instance->told = false;
     instance_state_moved(instance);
     instance->now.tolerance = TOLERANCE;
     for (size_t i = 0; i < VARIABLE_COUNT; i++) instance->now.values[i] = VARIABLES[i].start;
     instance_start_rate(instance);
     instance_start_attitude(instance);
+    bound_start(instance);
 }
 
 static bool is_digit(char c) {
@@ -137,7 +143,7 @@ Status instance_refuse(Instance *instance, const char *format, ...) {
 void instance_inform(Instance *instance, LogCategory category, const char *format, ...) {
     va_list arguments;
     va_start(arguments, format);
-    write_message(instance, STATUS_OK, category, format, arguments);
+    write_message(instance, category == LOG_ACCURACY ? STATUS_WARNING : STATUS_OK, category, format, arguments);
     va_end(arguments);
 }
 
@@ -226,6 +232,7 @@ Status instance_exit_initialization(Instance *instance) {
     if (status == STATUS_OK) status = composite_refresh(instance);
     if (status != STATUS_OK) return status;
     changes_start(instance);
+    bound_start(instance);
     instance->now.state = instance->now.model_exchange ? EVENT : STEPPING;
     /* where the states lead now, the rate follows from them as it will ever after */
     if (STATE_IS_MOMENTUM) instance_state_moved(instance);

@@ -66,7 +66,7 @@ typedef enum {
 } State;
 
 /* Log categories, as bits. */
-typedef enum { LOG_DISCARD = 1, LOG_ERROR = 2, LOG_COMPOSITE = 4, LOG_ALL = 7 } LogCategory;
+typedef enum { LOG_DISCARD = 1, LOG_ERROR = 2, LOG_COMPOSITE = 4, LOG_ACCURACY = 8, LOG_ALL = 15 } LogCategory;
 
 /* An FMI function: the states it may be called in, and what it answers to values that cannot be used. */
 typedef struct {
@@ -92,6 +92,9 @@ typedef bool (*SubStepListener)(Instance *instance, double *end);
    then): a free step that stands alone costs nothing more. */
 typedef enum { EPOCH_NEW, EPOCH_SERVED, EPOCH_DOUBLED } EpochStep;
 
+/* Places in errors. */
+enum { ESTIMATE, BOUND };
+
 /* All that a saved state holds. The doubles come first: there is no padding but at the end, and that stays zero. Arrays
    that a scene does not need have one element, which stays zero too. */
 typedef struct {
@@ -99,7 +102,11 @@ typedef struct {
     double start_time;                /* s */
     double stop_time;                 /* s, meaningful if stop_time_defined */
     double tolerance;                 /* the importer's or the scene's */
-    double error_estimate;            /* rad, of the last communication step */
+    double errors[2];                 /* rad: the estimate of the last communication step; the bound since the start */
+    double bound[ERROR_BOUND ? 3 : 1]; /* of the angle, rad; of the rate in the energy norm, J^(1/2); of the rate, rad/s */
+    struct {
+        double rate[ERROR_BOUND ? 3 : 1], c[ERROR_BOUND ? COMPOSITE_COUNT : 1];
+    } bound_from;                     /* rate and composite that a change of inputs begins from, with stepped_p */
     double x[STATE_IS_MOMENTUM ? STATE_COUNT : 1]; /* attitude and angular velocity; the states hold the momentum */
     double kept_momentum[STATE_IS_MOMENTUM ? 3 : 1]; /* N.m.s, of the states when changes were committed last */
     double kept_rate[CHANGES ? 3 : 1]; /* rad/s, that a change of inputs began from, with stepped_p */
@@ -117,6 +124,7 @@ typedef struct {
     unsigned stop_time_defined;
     unsigned composite_is_current;    /* p and c follow from the inputs as they are */
     unsigned composite_is_ordinary;   /* products of a few numbers of p and c are doubles */
+    unsigned composite_is_tame;       /* so are those of a dozen */
     unsigned axes_are_current;        /* a follows from c */
     unsigned epoch_holds;             /* the motion has been free since epoch, with stepped_p */
     unsigned epoch_step;              /* an EpochStep */
@@ -160,6 +168,7 @@ struct Instance {
     bool within_step;                 /* in the importer's callback: most calls have to wait */
     bool event_mode_used;             /* in co-simulation */
     unsigned log_categories;
+    bool told;                        /* that the bound of the error has passed what the scene asks for */
     char name[PRINT_SIZE];            /* the importer's name of the instance, as it is printed */
 };
 
@@ -216,14 +225,14 @@ static inline void instance_state_moved(Instance *instance) {
     if (STATE_IS_MOMENTUM) instance->mirror_is_current = false;
 }
 
-/* Points the first arguments of the model's functions to x, u, c, a, and the estimate. Of ode and response the first
+/* Points the first arguments of the model's functions to x, u, c, a, and the errors. Of ode and response the first
    one is the states instead. */
 static inline void instance_set_arguments(Instance *instance) {
     instance->arg[0] = instance_x(instance);
     instance->arg[1] = &instance->now.values[REFERENCE_TORQUE];
     instance->arg[2] = instance->now.c;
     instance->arg[3] = instance->now.a;
-    instance->arg[4] = &instance->now.error_estimate;
+    instance->arg[4] = instance->now.errors;
 }
 static inline void instance_set_state_arguments(Instance *instance) {
     instance_set_arguments(instance);

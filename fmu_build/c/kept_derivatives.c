@@ -6,6 +6,7 @@
 
 #include "kept_in_changes.h"
 #include "model.h"
+#include "stages.h"
 
 /* Whether the angular velocity follows from inputs: in co-simulation, but not within a step. */
 static bool rate_follows(const Instance *instance) {
@@ -24,7 +25,7 @@ static Status stages_of(Instance *instance, Stages *stages) {
     const Dynamics *now = &instance->now;
     stages->varied_before = MASSES_KEEP_MOMENTUM ? 0 : KIND_MASS;
     stages->varied_after = MASSES_KEEP_MOMENTUM ? KIND_MASS : KIND_MASS | KIND_POSE;
-    first_stage(instance, now->p, &stages->before);
+    first_stage(&stages->before, now->stepped_p, now->kept_c, now->p);
     move_stage(&stages->before, now->p, stages->varied_before);
     stages->after = stages->before;
     move_stage(&stages->after, now->p, stages->varied_after);

@@ -1,29 +1,13 @@
 /* Masses or poses keep the angular momentum when they change: the rate after a change, stage by stage, from what was
    committed: docks open, masses and moments change, then poses.
 
-   Needs of the model: keep_momentum; INPUT_KINDS, which inputs are which. */
+   Needs of the model: keep_momentum. */
 #include "kept_in_changes.h"
 
 #include <string.h>
 
 #include "model.h"
-
-/* Takes inputs of some kinds over from p; not docks that close. Returns whether any was another. */
-static bool take_over(double stage[], const double p[], unsigned kinds) {
-    enum { AT_ONCE = 64 };
-    bool changed = false;
-    for (size_t begin = 0; begin < INPUT_P_COUNT; begin += AT_ONCE) {
-        const size_t end = begin + AT_ONCE < INPUT_P_COUNT ? begin + AT_ONCE : INPUT_P_COUNT;
-        if (memcmp(&stage[begin], &p[begin], (end - begin) * sizeof *p) == 0) continue;
-        for (size_t i = begin; i < end; i++) {
-            if (!(INPUT_KINDS[i] & kinds) || stage[i] == p[i]) continue;
-            if (INPUT_KINDS[i] == KIND_DOCKED && p[i] != 0.0) continue;
-            stage[i] = p[i];
-            changed = true;
-        }
-    }
-    return changed;
-}
+#include "stages.h"
 
 /* Computes and judges the composite c of inputs p on the way of a change. */
 static Status composite_between(Instance *instance, const double p[], double c[]) {
@@ -37,23 +21,10 @@ static Status composite_between(Instance *instance, const double p[], double c[]
                            c[COMPOSITE_MASS], J[0], J[1], J[2], J[3], J[4], J[5]);
 }
 
-bool move_stage(Stage *stage, const double p[], unsigned kinds) {
-    const bool changed = take_over(stage->p, p, kinds);
-    if (changed) stage->c_is_current = false;
-    return changed;
-}
-
 Status weigh_stage(Instance *instance, Stage *stage) {
     const Status status = stage->c_is_current ? STATUS_OK : composite_between(instance, stage->p, stage->c);
     stage->c_is_current = status == STATUS_OK;
     return status;
-}
-
-void first_stage(const Instance *instance, const double p[], Stage *stage) {
-    memcpy(stage->p, instance->now.stepped_p, sizeof stage->p);
-    memcpy(stage->c, instance->now.kept_c, sizeof stage->c);
-    stage->c_is_current = true;
-    move_stage(stage, p, KIND_DOCKED);
 }
 
 /* Goes on from a stage to one where inputs of some kinds are as in p, whose composite is c, keeping the momentum. */
@@ -83,7 +54,7 @@ static Status keep(Instance *instance, Stage *stage, const double p[], const dou
 Status rate_on_the_way(Instance *instance, const double p[], const double c[], double rate[3]) {
     Stage stage;
     Status status = STATUS_OK;
-    first_stage(instance, p, &stage);
+    first_stage(&stage, instance->now.stepped_p, instance->now.kept_c, p);
     if (MASSES_KEEP_MOMENTUM)
         status = keep(instance, &stage, p, c, KIND_MASS, rate);
     else

@@ -10,7 +10,9 @@
      z [STATE_COUNT]      states of model exchange: x, or attitude and angular momentum, N.m.s
      c, d [COMPOSITE_COUNT]  composites
      a [AXES_COUNT]       principal moments and axes
-     e                    estimated error of the last communication step, rad
+     e [2]                estimated error of the last communication step, and bound of the error, rad
+     b [3]                bound of the error: angle, rad; of the rate, energy norm, J^(1/2), and length, rad/s
+     s [4]                a sub-step: its size, s; one more than its order, 0: free; its error estimated, rad and rad/s
      y [OUTPUT_COUNT]     outputs
      omega, momentum [3]  rad/s, N.m.s
      h, t                 times, s
@@ -47,6 +49,9 @@ int fastest_square(const double **arg, double **res, int *iw, double *w, int mem
 int step(const double **arg, double **res, int *iw, double *w, int mem);              /* x, u, c, h -> x, error */
 int by_torque(const double **arg, double **res, int *iw, double *w, int mem);         /* u, c -> rad/s2 */
 int rounding(const double **arg, double **res, int *iw, double *w, int mem);          /* x, u, c, h -> rad */
+int bound_step(const double **arg, double **res, int *iw, double *w, int mem);        /* x, u, c, a, s, b -> b */
+int bound_kept_rate(const double **arg, double **res, int *iw, double *w, int mem);   /* b[1], c, d -> b[1] */
+int bound_kept_momentum(const double **arg, double **res, int *iw, double *w, int mem); /* b[1], c, d, omega, omega -> b[1] */
 int free_phase(const double **arg, double **res, int *iw, double *w, int mem);        /* x, a, t -> rad */
 int free_start(const double **arg, double **res, int *iw, double *w, int mem);        /* x, a, t, share -> v, k */
 int free_double(const double **arg, double **res, int *iw, double *w, int mem);       /* v, k -> v */

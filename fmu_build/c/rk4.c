@@ -11,7 +11,7 @@ static const double MOST_SUB_STEPS = 1e7;
 /* Takes one sub-step of at most the model's longest, what remains being shared out evenly. */
 Status solver_sub_step(Instance *instance, Progress *progress) {
     double *x = instance_x(instance);
-    double square, next[STATE_COUNT], error[2] = {0.0, 0.0};
+    double square, next[STATE_COUNT], *error = progress->found;
     instance_set_arguments(instance);
     instance->res[0] = &square;
     fastest_square(instance->arg, instance->res, instance->iw, instance->w, 0);

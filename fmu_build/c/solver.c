@@ -1,13 +1,14 @@
 /* Communication steps of co-simulation: judges the times that the importer gives, takes one sub-step after the other
    until the step ends, tells the importer of each, and puts everything back where a sub-step is refused.
 
-   Owns time, error estimate and stepped_p of a step; what a sub-step does to attitude and angular velocity is the
+   Owns time, the estimate of the error and stepped_p of a step; what a sub-step does to attitude and angular velocity is the
    method's, see solver.h. Needs a composite that composite.c has judged. */
 #include "solver.h"
 
 #include <string.h>
 
 #include "composite.h"
+#include "error_bound.h"
 #include "model.h"
 #include "variables.h"
 
@@ -67,6 +68,7 @@ static double turned_by_rounding(Instance *instance, const double x[], double el
 static void begin(Progress *progress, double h) {
     progress->h = progress->remaining = h;
     progress->taken = progress->error = progress->next_size = 0.0;
+    progress->found[0] = progress->found[1] = 0.0;
     progress->was_free = false;
 }
 
@@ -79,21 +81,29 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
     Progress progress;
     begin(&progress, h);
     double start[STATE_COUNT], end = time + h;
-    const double start_time = now->values[REFERENCE_TIME], start_error = now->error_estimate;
+    const double start_time = now->values[REFERENCE_TIME], start_errors[2] = {now->errors[0], now->errors[1]};
+    double start_bound[sizeof now->bound / sizeof *now->bound];
+    memcpy(start_bound, now->bound, sizeof start_bound);
     memcpy(start, instance_x(instance), sizeof start);
+    bound_over_change(instance);
     const Call *call = instance->call;
     while (progress.remaining > 0.0) {
         instance->call = call;
+        double before[ERROR_BOUND ? STATE_COUNT : 1];
+        if (ERROR_BOUND) memcpy(before, instance_x(instance), sizeof before);
+        const double left = progress.remaining;
         status = solver_advance(instance, &progress);
         instance_state_moved(instance);
         if (status != STATUS_OK) {
             memcpy(instance_x(instance), start, sizeof start);
             now->values[REFERENCE_TIME] = start_time;
-            now->error_estimate = start_error;
+            memcpy(now->errors, start_errors, sizeof start_errors);
+            memcpy(now->bound, start_bound, sizeof start_bound);
             return status;
         }
         now->values[REFERENCE_TIME] = progress.remaining > 0.0 ? end - progress.remaining : end;
-        now->error_estimate =
+        bound_over_sub_step(instance, before, left - progress.remaining, &progress);
+        now->errors[ESTIMATE] =
             progress.error + turned_by_rounding(instance, start, now->values[REFERENCE_TIME] - start_time);
         if (!instance->sub_step_ended) continue;
         const double wanted = listen(instance, end);
@@ -106,5 +116,6 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
     }
     now->epoch_holds = progress.was_free;
     memcpy(now->stepped_p, now->p, sizeof now->p);
+    bound_remember(instance);
     return STATUS_OK;
 }

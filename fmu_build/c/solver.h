@@ -22,6 +22,7 @@ typedef struct {
     double h, remaining; /* s: its size, and what is left of it */
     double taken;        /* sub-steps, those that were taken again included */
     double error;        /* rad, estimated, at the step's end */
+    double found[2];     /* rad, rad/s: estimated, that the last sub-step added */
     bool was_free;       /* its last sub-step */
     double next_size;    /* s, of the next sub-step, where the error controls it; 0: not known, nor is what follows */
     int exponent;        /* power of a sub-step that its estimated error grows with */

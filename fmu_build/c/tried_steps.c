@@ -20,7 +20,7 @@ void tried_call(Instance *instance, const double x[], double size, double next[]
    the rate turns the body on for what remains, but counts no less than relative to the rate. */
 Status solver_sub_step(Instance *instance, Progress *progress) {
     const double *x = instance_x(instance);
-    double next[STATE_COUNT], error[2];
+    double next[STATE_COUNT], *error = progress->found;
     if (progress->next_size == 0.0) {
         progress->exponent = ERROR_EXPONENT;
         progress->next_size = tried_first_size(instance, progress);

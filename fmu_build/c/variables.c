@@ -41,17 +41,16 @@ Status instance_check_attitude(Instance *instance) {
     return STATUS_OK;
 }
 
-bool are_ordinary(const double numbers[], size_t count) {
-    static const double limit = 0x1p150;
-    bool ordinary = true;
-    for (size_t i = 0; i < count; i++) ordinary = ordinary && fabs(numbers[i]) <= limit;
-    return ordinary;
+bool are_within(const double numbers[], size_t count, double limit) {
+    bool within = true;
+    for (size_t i = 0; i < count; i++) within = within && fabs(numbers[i]) <= limit;
+    return within;
 }
 
 bool instance_is_ordinary(Instance *instance) {
-    return instance->now.composite_is_ordinary && are_ordinary(instance_x(instance), STATE_COUNT) &&
-           (!STATE_IS_MOMENTUM || are_ordinary(instance_states(instance), STATE_COUNT)) &&
-           are_ordinary(&instance->now.values[REFERENCE_TORQUE], INPUT_U_COUNT);
+    return instance->now.composite_is_ordinary && are_within(instance_x(instance), STATE_COUNT, ORDINARY) &&
+           (!STATE_IS_MOMENTUM || are_within(instance_states(instance), STATE_COUNT, ORDINARY)) &&
+           are_within(&instance->now.values[REFERENCE_TORQUE], INPUT_U_COUNT, ORDINARY);
 }
 
 static Status refresh_outputs(Instance *instance) {

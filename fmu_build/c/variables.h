@@ -30,8 +30,11 @@ Status instance_set_states(Instance *instance, const double states[], size_t cou
 Status instance_get_rates(Instance *instance, double rates[], size_t count);
 Status instance_get_nominals(Instance *instance, double nominals[], size_t count);
 
-/* Whether products of a few of these numbers are doubles. */
-bool are_ordinary(const double numbers[], size_t count);
+/* Whether all of these numbers are of a size up to the limit. */
+bool are_within(const double numbers[], size_t count, double limit);
+
+/* Sizes of numbers up to which products of a few, and of a dozen, surely are doubles. */
+static const double ORDINARY = 0x1p150, TAME = 0x1p60;
 
 /* Whether all that follows from states, inputs and composite surely is within the range of doubles. */
 bool instance_is_ordinary(Instance *instance);

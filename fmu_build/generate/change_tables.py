@@ -1,5 +1,6 @@
 """C macros and tables about changes of inputs: the kind of change of each input, and the docks."""
 
+from fmu_build.generate.picked_files import has_stages
 from supervessel.equations import Equations
 from supervessel.scene.inputs import vessel_of
 from supervessel.scene.schema import keeps_momentum
@@ -36,7 +37,7 @@ def change_constants(model: Equations) -> dict[str, int]:
 def change_tables(model: Equations) -> str:
     """Returns C of the tables INPUT_KINDS and DOCKS, each where the scene needs it; "" if it needs none."""
     text, resolved = "", model.resolved
-    if model.change is not None:
+    if model.change is not None or has_stages(model):
         kinds = ", ".join(f"KIND_{variable.kind.change.upper()}" for variable in resolved.shaping)
         text += f"\nconst unsigned char INPUT_KINDS[INPUT_P_COUNT] = {{{kinds}}};\n"
     if resolved.contact:

@@ -1,6 +1,7 @@
 """The choice of files of the C layer: some are in every FMU, the others only where the scene needs them."""
 
 from supervessel.equations import Equations
+from supervessel.rotation.error_bound.functions import keeps_in_truth
 from supervessel.rotation.propagators import PROPAGATORS, WHEN_FREE
 from supervessel.scene.schema import keeps_momentum
 
@@ -20,12 +21,14 @@ CHANGES = frozenset(
         "kept_in_changes",
     }
 )
+BOUND = frozenset({"error_bound"})
+STAGES = frozenset({"stages"})
 STEPS = frozenset(WHEN_FREE.values()).union(*(method.c_files for method in PROPAGATORS.values()))
 
-PICKED = LOOP | BOOLEANS | CHANGES | STEPS
+PICKED = LOOP | BOOLEANS | CHANGES | BOUND | STAGES | STEPS
 """Names, without .c and .h, of the files that are not in every FMU, HEADERS excepted."""
 
-HEADERS = frozenset({"changes.h", "docks.h", "booleans.h"})
+HEADERS = frozenset({"changes.h", "error_bound.h", "docks.h", "booleans.h"})
 """Headers with such names that are in every FMU, because other files include them."""
 
 
@@ -40,7 +43,23 @@ def picked_files(model: Equations, has_loop: bool) -> frozenset[str]:
     has_loop : whether a loop puts the composite together
     """
     docks = BOOLEANS if model.resolved.scene.inputs.docked else frozenset()
-    return model.plan.c_files | _for_changes(model) | docks | (LOOP if has_loop else frozenset())
+    bound = BOUND if model.bound else frozenset()
+    stages = STAGES if has_stages(model) else frozenset()
+    return (
+        model.plan.c_files
+        | _for_changes(model)
+        | docks
+        | bound
+        | stages
+        | (LOOP if has_loop else frozenset())
+    )
+
+
+def has_stages(model: Equations) -> bool:
+    """Whether a change of inputs goes stage by stage, since something keeps the momentum over one."""
+    scene = model.resolved.scene
+    keeps = keeps_in_truth(scene) if model.bound else {} if model.change is None else scene.keeps
+    return "momentum" in keeps.values()
 
 
 def _for_changes(model: Equations) -> frozenset[str]:

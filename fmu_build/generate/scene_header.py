@@ -6,9 +6,10 @@ import casadi as ca
 
 from fmu_build.generate.change_tables import change_constants
 from fmu_build.generate.vessel_loop import LoopTables, loop_constants
-from fmu_build.interface.model_description import LOG_CATEGORIES
+from fmu_build.interface.model_description import LOG_CATEGORIES, tells_accuracy
 from fmu_build.interface.variable_table import TableEntry
 from supervessel.equations import Equations
+from supervessel.rotation.error_bound.functions import keeps_in_truth
 from supervessel.rotation.propagators.free_motion import FIRST_ANGLE, LARGEST_TURN
 from supervessel.rotation.propagators.taylor import (
     HALF_ORDER_AT_1,
@@ -45,6 +46,7 @@ def scene_header(
         "AXES_COUNT": model.axes.numel_out(0),
         **change_constants(model),
         **loop_constants(loop),
+        **_bound(model),
         **_plan(model),
         **_limits(model.resolved.scene),
     }
@@ -141,6 +143,28 @@ def _plan(model: Equations) -> dict[str, object]:
         "SAFETY": repr(method.safety if method else 1.0),
         "PRODUCT_COUNT": model.product_count,
         "ROUNDING": int(any(f.name() == "rounding" for f in model.steps.propagation)),
+    }
+
+
+def _bound(model: Equations) -> dict[str, object]:
+    """Returns macros about the bound of the error.
+
+    ERROR_BOUND                : 1 if it is an output
+    BOUND_MASSES_KEEP_MOMENTUM : 1 if a change of masses or moments keeps the angular momentum under the law
+                                 tensor, which the bound is about
+    BOUND_POSES_KEEP_MOMENTUM  : 1 if a change of poses keeps it
+    ACCURACY_ASKED             : 1 if passing what the scene asks for is logged: ASKED_ATTITUDE [rad] or
+                                 ASKED_RATE [rad/s]
+    """
+    scene = model.resolved.scene
+    keeps, asked = keeps_in_truth(scene) if model.bound else {}, scene.accuracy
+    return {
+        "ERROR_BOUND": int(bool(model.bound)),
+        "BOUND_MASSES_KEEP_MOMENTUM": int(keeps.get("mass") == "momentum"),
+        "BOUND_POSES_KEEP_MOMENTUM": int(keeps.get("pose") == "momentum"),
+        "ACCURACY_ASKED": int(tells_accuracy(scene)),
+        "ASKED_ATTITUDE": "HUGE_VAL" if asked is None else repr(asked.attitude),
+        "ASKED_RATE": "HUGE_VAL" if asked is None or asked.rate is None else repr(asked.rate),
     }
 
 

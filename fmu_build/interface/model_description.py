@@ -10,10 +10,13 @@ from fmu_build.interface.xml_text import xml_text
 from fmu_build.versions import VERSIONS, Version
 from supervessel.scene.schema import Scene
 
+LOG_ACCURACY = "logAccuracy"
+
 LOG_CATEGORIES = {
     "logStatusDiscard": "a value or a step was refused; the instance is as it was before the call",
     "logStatusError": "a rule of the standard was broken; the instance is terminated",
     "logComposite": "the composite was computed because one of its inputs changed",
+    LOG_ACCURACY: "the bound of the error has passed what the scene asks for; told once",
     "logAll": "all of these",
 }
 """Names of the categories of log messages, and what each tells."""
@@ -191,7 +194,7 @@ def _definitions(root: ET.Element, scene: Scene, entries: Sequence[TableEntry], 
     """Writes what stands between the interfaces and the variables in both versions of FMI."""
     add_units(root, entries)
     add_types(root, entries, type_tag)
-    _log_categories(root)
+    _log_categories(root, scene)
     _experiment(root, scene)
 
 
@@ -215,10 +218,16 @@ def _dependencies(dependencies: Sequence[Dependency], offset: int = 0) -> dict[s
     }
 
 
-def _log_categories(root: ET.Element) -> None:
+def tells_accuracy(scene: Scene) -> bool:
+    """Whether the FMU logs that the bound of its error has passed what the scene asks for."""
+    return scene.accuracy is not None and "error_bound" in scene.outputs.names
+
+
+def _log_categories(root: ET.Element, scene: Scene) -> None:
     categories = ET.SubElement(root, "LogCategories")
     for name, description in LOG_CATEGORIES.items():
-        ET.SubElement(categories, "Category", name=name, description=description)
+        if name != LOG_ACCURACY or tells_accuracy(scene):
+            ET.SubElement(categories, "Category", name=name, description=description)
 
 
 def _experiment(root: ET.Element, scene: Scene) -> None:

@@ -10,7 +10,8 @@ Symbols, each a column vector; units and axes are those of the FMU's variables:
         change of inputs keeps the momentum; see `rotation.exchange`
     c : everything that follows from p alone, see `composite.parts`
     a : principal moments and axes, which follow from c, see `rotation.axes`
-    e : estimated error of the last communication step [rad], which the output error_estimate shows
+    e : (2,) [rad], estimated error of the last communication step, and bound of the error since the start,
+        which the outputs error_estimate and error_bound show
     y : the outputs in the scene's order, see `scene.outputs`
 
 c is computed when p changes; a is computed when it is needed and c has changed. An element of c that is
@@ -38,6 +39,7 @@ from supervessel.output_expressions import outputs_of
 from supervessel.rotation.axes import axes_derivative, axes_graph
 from supervessel.rotation.changes import Change, change_functions
 from supervessel.rotation.dynamics import dynamics_of
+from supervessel.rotation.error_bound.functions import bound_functions
 from supervessel.rotation.exchange import ExchangeStates, states_by_momentum, states_by_rate
 from supervessel.rotation.propagators import Plan, plan_of
 from supervessel.rotation.steps import StepFunctions, map_of_products, step_functions
@@ -107,6 +109,7 @@ class Equations:
     outputs         : x, u, c, a, e -> y
     product_count   : number of products of two rates in the gyroscopic term, see `steps.map_of_products`
     steps           : functions of steps in time
+    bound           : functions by which the FMU carries its error_bound, see `rotation.error_bound.functions`
     exchange        : functions of model exchange
     change          : how the angular velocity changes with the inputs; None where it never does
     changing        : the functions of `change` that the FMU needs, with derivatives
@@ -123,6 +126,7 @@ class Equations:
     outputs: ca.Function
     product_count: int
     steps: StepFunctions
+    bound: tuple[ca.Function, ...]
     exchange: ExchangeFunctions
     change: Change | None
     changing: tuple[ca.Function, ...]
@@ -146,7 +150,7 @@ class Equations:
     @property
     def _motion(self) -> tuple[ca.Function, ...]:
         axes = (self.axes,) if self.slices.axes else ()
-        return (self.exchange.ode, self.outputs, *self.steps.propagation, *axes)
+        return (self.exchange.ode, self.outputs, *self.steps.propagation, *self.bound, *axes)
 
     @property
     def _responses(self) -> tuple[ca.Function, ...]:
@@ -167,8 +171,8 @@ def equations(scene: Scene) -> Equations:
     parts = graph.parts(c)
     dynamics = dynamics_of(resolved, parts, u)
     products = map_of_products(dynamics)
-    axes = axes_graph(resolved, plan, dynamics.inertia, products)
-    a, e = ca.SX.sym("a", axes.a.numel()), ca.SX.sym("e")
+    axes = axes_graph(resolved, plan, dynamics, products)
+    a, e = ca.SX.sym("a", axes.a.numel()), ca.SX.sym("e", 2)
     change = change_functions(resolved, c, graph.parts, graph.p, k) if changes_rate(scene) else None
     if change is not None and keeps_momentum(scene):
         states = states_by_momentum(change, c, dynamics)
@@ -177,7 +181,8 @@ def equations(scene: Scene) -> Equations:
 
     def outputs_from(state: ca.SX) -> ca.SX:
         shown = a[axes.slices["principal"]] if "principal" in axes.slices else ca.SX.zeros(7)
-        return outputs_of(resolved, state, u, parts | {"principal": shown, "error_estimate": e})
+        of_steps = {"error_estimate": e[0], "error_bound": e[1]}
+        return outputs_of(resolved, state, u, parts | {"principal": shown} | of_steps)
 
     axes_change = axes_derivative(dynamics.inertia, c, a, axes.slices)
     return Equations(
@@ -192,6 +197,7 @@ def equations(scene: Scene) -> Equations:
         outputs=_output_function(x, "x", outputs_from(x), (u, c, a, e)),
         product_count=products.size2(),
         steps=step_functions(scene, plan, dynamics, (x, u, c), axes),
+        bound=bound_functions(resolved, plan, graph, axes, (x, u, c)),
         exchange=_exchange_functions(states, outputs_from(states.x), (u, c, a, e), axes_change),
         change=change,
         changing=_changing(scene, change),

@@ -21,7 +21,7 @@ class Known:
     omega    : angular velocity, (3,) [rad/s], body axes
     u        : the inputs that act, (m,) [N m, N]
     parts    : by name, the parts of c, see `composite.parts`; "principal", the part of a, (7,), zeros where
-               no output shows it; "error_estimate" [rad]
+               no output shows it; "error_estimate" and "error_bound" [rad]
     inertia  : J about the barycentre, (3, 3) [kg m2], body axes
     """
 
@@ -57,6 +57,7 @@ EXPRESSIONS: dict[str, Callable[[Known], ca.SX]] = {
     "principal_moments": lambda known: known.parts["principal"][:3],
     "principal_axes": lambda known: known.parts["principal"][3:],
     "error_estimate": lambda known: known.parts["error_estimate"],
+    "error_bound": lambda known: known.parts["error_bound"],
     "net_force": lambda known: net_force(known.resolved, known.parts, known.u),
 }
 """By name of an output of the whole, its expression; `composite.actions.vessel_outputs` has those of vessels.

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from supervessel import reference
 from supervessel.composite.inertia import from_upper_triangle
 from supervessel.rotation.attitude import attitude_dot
-from supervessel.rotation.error_bound import (
+from supervessel.rotation.error_bound.carried import (
     TurnedBody,
     carried,
     growth,
@@ -24,19 +24,19 @@ from supervessel.rotation.error_bound import (
     largest_growth,
     largest_residual,
     motion_bounds,
-    norm_of,
 )
-from supervessel.rotation.laws import LAWS
-from supervessel.rotation.propagators import dop853
-from supervessel.rotation.propagators.rk4 import rk4_step
-from supervessel.rotation.propagators.taylor import taylor_step
-from supervessel.rotation.step_remainder import (
+from supervessel.rotation.error_bound.constants import bound_constants, norm_of
+from supervessel.rotation.error_bound.remainder import (
     DEPTH,
     RK4_STAGES,
     RK4_WEIGHTS,
     remainder_of,
     step_error,
 )
+from supervessel.rotation.laws import LAWS
+from supervessel.rotation.propagators import dop853
+from supervessel.rotation.propagators.rk4 import rk4_step
+from supervessel.rotation.propagators.taylor import taylor_step
 from support import EPS
 
 Array = NDArray[np.float64]
@@ -87,7 +87,9 @@ def bound_function(law: str, method: str = "rk4") -> ca.Function:
         ca.SX.sym(*s) for s in (("x", 7), ("b", 2), ("J", 6), ("M", 3), ("spin", 3), ("h",))
     )
     J = from_upper_triangle(six)
-    numbers, body, norm = rules.prepare(J), TurnedBody(J, M, spin), norm_of(J)
+    numbers, body = rules.prepare(J), TurnedBody(J, M, spin)
+    constants = bound_constants(rules, numbers, J)
+    norm = constants.norm
     acting = spin if rules.gyroscopic_term else ca.SX.zeros(3)
 
     def rate(state: ca.SX) -> ca.SX:
@@ -99,10 +101,10 @@ def bound_function(law: str, method: str = "rk4") -> ca.Function:
         "dop853": lambda: dop853.dop853_step(rate, x, h)[0],
         "taylor": lambda: taylor_step(rules, numbers, M, x, h, 12)[0],
     }
-    motion = motion_bounds(rules, numbers, body, x[4:], h)
+    motion = motion_bounds(constants, body, x[4:], h)
     residual = ca.SX(0.0) if law == "tensor" else largest_residual(norm, body, motion)
     lam = largest_growth(norm, motion)
-    off = step_error(remainder_of(method, 12), rules, numbers, body, motion)
+    off = step_error(remainder_of(method, 12), constants, body, motion)
     found = carried(bound, norm.rate_share, lam, residual, h) + off
     parts = ca.vertcat(lam, residual, off)
     arguments = [x, bound, six, M, spin, h]
@@ -253,8 +255,9 @@ def suprema_function(law: str) -> ca.Function:
     rules = LAWS[law]
     w, six, M, spin, h = (ca.SX.sym(*s) for s in (("w", 3), ("J", 6), ("M", 3), ("spin", 3), ("h",)))
     J = from_upper_triangle(six)
-    body, norm = TurnedBody(J, M, spin), norm_of(J)
-    motion = motion_bounds(rules, rules.prepare(J), body, w, h)
+    body, constants = TurnedBody(J, M, spin), bound_constants(rules, rules.prepare(J), J)
+    norm = constants.norm
+    motion = motion_bounds(constants, body, w, h)
     results = [largest_growth(norm, motion), largest_residual(norm, body, motion)]
     results += [motion.reach, motion.fastest, motion.curve]
     return ca.Function("suprema", [w, six, M, spin, h], results)

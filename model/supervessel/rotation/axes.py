@@ -9,6 +9,8 @@ from supervessel.composite.resolved import ResolvedScene
 from supervessel.derivatives import GivenDerivative
 from supervessel.layout import stacked
 from supervessel.rotation.attitude import rotation_matrix
+from supervessel.rotation.dynamics import Dynamics
+from supervessel.rotation.error_bound.constants import bound_constants, stored
 from supervessel.rotation.laws import LAWS, principal_products
 from supervessel.rotation.principal import principal, principal_forward, quaternion_of_axes
 from supervessel.rotation.propagators import Plan
@@ -26,10 +28,10 @@ class AxesGraph:
     slices: Mapping[str, slice]
 
 
-def axes_graph(resolved: ResolvedScene, plan: Plan, inertia: ca.SX, products: ca.SX) -> AxesGraph:
+def axes_graph(resolved: ResolvedScene, plan: Plan, dynamics: Dynamics, products: ca.SX) -> AxesGraph:
     """Returns the principal moments and axes that a scene's outputs and propagation need.
 
-    inertia  : of the composite, (3, 3) [kg m2], body axes
+    dynamics : of the composite
     products : the law's map of products of rates, see `rotation.steps.map_of_products`
 
     principal : (7,), where outputs show it: moments [kg m2], ascending, and q_body_principal
@@ -37,7 +39,9 @@ def axes_graph(resolved: ResolvedScene, plan: Plan, inertia: ca.SX, products: ca
                 R_body_principal, column by column
     series    : for Taylor steps: the factors (J_j - J_k)/J_i of products of two rates, (3,), principal axes;
                 then, unless body axes are principal axes, R_body_principal, (9,), column by column
+    bound     : (n,), where error_bound is an output: see `rotation.error_bound.constants.stored`
     """
+    inertia = dynamics.inertia
     rotation = resolved.scene.rotation
     shown = any(kind.axes for kind, _ in resolved.output_kinds)
     in_series = plan.method is not None and plan.method.control == "series"
@@ -54,6 +58,8 @@ def axes_graph(resolved: ResolvedScene, plan: Plan, inertia: ca.SX, products: ca
         parts["series"] = ca.vertcat(principal_products(moments), ca.vec(R_body_principal))
     elif in_series:
         parts["series"] = ca.diag(products) if products.numel() else ca.SX(0, 1)
+    if "error_bound" in resolved.scene.outputs.names:
+        parts["bound"] = stored(bound_constants(dynamics.law, dynamics.numbers, inertia))
     slices, a = stacked(parts)
     return AxesGraph(a, slices)
 

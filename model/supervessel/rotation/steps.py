@@ -47,7 +47,8 @@ def step_functions(
     A scene that has exact free motion alone is given the step of dop853, which its co-simulation never takes.
     """
     x, h = symbols[0], ca.SX.sym("h")
-    shows_error = "error_estimate" in scene.outputs.names
+    shown = "error_estimate" in scene.outputs.names
+    estimated = shown or "error_bound" in scene.outputs.names
     motion = StepSymbols(
         x,
         dynamics.state_rate,
@@ -56,7 +57,7 @@ def step_functions(
         dynamics.torque,
         h,
         scene.rotation.tolerance,
-        shows_error,
+        estimated,
     )
     method = plan.method or PROPAGATORS["dop853"]
     assert method.build is not None
@@ -67,9 +68,7 @@ def step_functions(
     series = ca.Function(
         "by_torque", [*symbols[1:]], [motion.acceleration_by_torque], ["u", "c"], ["acceleration"]
     )
-    rounding = (
-        [_rounding_function(motion, dynamics, symbols, h)] if shows_error and dynamics.law.products else []
-    )
+    rounding = [_rounding_function(motion, dynamics, symbols, h)] if shown and dynamics.law.products else []
     needed = {"angle": (rate_square, step), "error": (step,), "series": (series,)}
     stepping = needed[plan.method.control] if plan.method else ()
     return StepFunctions(

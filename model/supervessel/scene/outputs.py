@@ -119,6 +119,14 @@ OUTPUTS: dict[str, OutputKind] = {
             (),
             of_step=True,
         ),
+        OutputKind(
+            "error_bound",
+            "rad",
+            "in co-simulation: bound of the angle between the attitude and that of the law tensor with the "
+            "same inputs since the start; pi says nothing",
+            (),
+            of_step=True,
+        ),
         OutputKind("net_force", "N", "sum of the forces, body axes"),
     )
 }

@@ -8,20 +8,12 @@ from supervessel.composite.inertia import from_upper_triangle
 from supervessel.equations import Equations, composite_slices
 from supervessel.rotation.changes import contact_momentum, each_motion, stage_composites, stages
 from supervessel.rotation.dynamics import dynamics_of
-from supervessel.rotation.error_bound import (
-    TurnedBody,
-    carried,
-    kept_momentum,
-    kept_rate,
-    largest_growth,
-    largest_residual,
-    motion_bounds,
-    norm_of,
-)
+from supervessel.rotation.error_bound.carried import TurnedBody, kept_momentum, kept_rate
+from supervessel.rotation.error_bound.constants import bound_constants, norm_of
+from supervessel.rotation.error_bound.functions import bound_after_step, keeps_in_truth, spin_of
+from supervessel.rotation.error_bound.remainder import Remainder, remainder_of, step_error
 from supervessel.rotation.propagators import PROPAGATORS
 from supervessel.rotation.propagators.taylor import taylor_order
-from supervessel.rotation.step_remainder import Remainder, remainder_of, step_error
-from supervessel.scene.schema import Scene
 
 Parts = Mapping[str, ca.SX]
 
@@ -35,23 +27,15 @@ def bound_over_step(model: Equations, parts: Parts, bound: ca.SX, at: tuple[ca.S
     """
     x, u, h = at
     dynamics = dynamics_of(model.resolved, parts, u)
-    law, norm = dynamics.law, norm_of(dynamics.inertia)
+    constants = bound_constants(dynamics.law, dynamics.numbers, dynamics.inertia)
     body = TurnedBody(dynamics.inertia, dynamics.torque, spin_of(parts))
-    motion = motion_bounds(law, dynamics.numbers, body, x[4:], h)
-    exact = model.resolved.scene.rotation.law == "tensor"
-    residual = ca.SX(0.0) if exact else largest_residual(norm, body, motion)
-    found = carried(bound, norm.rate_share, largest_growth(norm, motion), residual, h)
-    return found + step_error(method_remainder(model), law, dynamics.numbers, body, motion)
+    found, motion = bound_after_step(constants, body, x, h, bound)
+    return found + step_error(method_remainder(model), constants, body, motion)
 
 
 def inertia_of(c: ca.SX) -> ca.SX:
     """Returns the tensor, (3, 3) [kg m2], of a composite."""
     return from_upper_triangle(c[composite_slices()["inertia"]])
-
-
-def spin_of(parts: Parts) -> ca.SX:
-    """Returns the angular momentum, (3,) [N m s], of parts that move relative to the body axes."""
-    return parts["momentum"][:3] if "momentum" in parts else ca.SX.zeros(3)
 
 
 def method_remainder(model: Equations) -> Remainder | None:
@@ -98,9 +82,3 @@ def bound_over_change(
     if model.change is None and closing.numel():
         energy += norm_of(end).of_torque(contact_momentum(resolved, after, each_motion(closing) * k))
     return ca.vertcat(bound[0], energy)
-
-
-def keeps_in_truth(scene: Scene) -> dict[str, str]:
-    """Returns what changes keep, by their kind, in the motion that the bound is about: the law "tensor"."""
-    rotation = scene.rotation.model_copy(update={"law": "tensor"})
-    return dict(scene.model_copy(update={"rotation": rotation}).keeps)

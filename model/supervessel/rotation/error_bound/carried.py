@@ -6,7 +6,7 @@ e     : w - omega, components each in its own body axes
 
 Two numbers are carried: a bound of the angle [rad] between both attitudes, and one of |e|_J = sqrt(e . J e),
 the energy norm [J^(1/2)], J = L L^T being the tensor at that time. Both hold for the exact motions; nothing
-is linearised and no sample stands for a span of time. Steps of a method are in `step_remainder`. Derivation:
+is linearised and no sample stands for a span of time. Steps of a method are in `remainder`. Derivation:
 [EB].
 """
 
@@ -14,59 +14,18 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from supervessel.composite.inertia import ldl
+from supervessel.composite.inertia import symmetric
+from supervessel.rotation.error_bound.constants import (
+    BoundConstants,
+    EnergyNorm,
+    largest_eigenvalue,
+    largest_of_traceless,
+    norm_of,
+)
 from supervessel.rotation.laws import RotationLaw
-
-COSINE_STEPS = 4
-"""Even number of steps of [EB] eq. (10); they leave at most 1e-5 of the cosine."""
-
-COSINE_SLACK = 2.0**-45
-"""Added to the argument of [EB] eq. (10): more than its rounding, 100 u."""
 
 INFLATION = 1.0 + 2.0**-44
 """What sums and products of fewer than 500 positive terms may lose to rounding."""
-
-
-@dataclass(frozen=True)
-class EnergyNorm:
-    """The energy norm of a tensor J = L L^T.
-
-    inertia : J, (3, 3) [kg m2]
-    lower   : L, (3, 3)
-    inverse : L^-1, (3, 3)
-    """
-
-    inertia: ca.SX
-    lower: ca.SX
-    inverse: ca.SX
-
-    def of_torque(self, torque: ca.SX) -> ca.SX:
-        """Returns |L^-1 torque|, the energy norm of J^-1 torque."""
-        return ca.norm_2(self.inverse @ torque)
-
-    @property
-    def rate_share(self) -> ca.SX:
-        """The least k with |e| <= k |e|_J: 1/sqrt(least moment), from above. [EB] eq. (6)."""
-        return ca.sqrt(largest_eigenvalue(self.inverse.T @ self.inverse))
-
-
-def norm_of(inertia: ca.SX) -> EnergyNorm:
-    """Returns the energy norm of a positive definite tensor, (3, 3) [kg m2]."""
-    lower, pivots = ldl(inertia)
-    roots = ca.sqrt(pivots)
-    L = ca.densify(_unit_lower(lower) @ ca.diag(roots))
-    m21, m31, m32 = -lower[0], lower[0] * lower[2] - lower[1], -lower[2]
-    inverse = ca.densify(ca.diag(1.0 / roots) @ _unit_lower(ca.vertcat(m21, m31, m32)))
-    return EnergyNorm(inertia, L, inverse)
-
-
-def _unit_lower(below: ca.SX) -> ca.SX:
-    """Returns the unit lower triangular matrix, (3, 3), of its elements 21, 31, 32."""
-    return ca.vertcat(
-        ca.horzcat(1.0, 0.0, 0.0),
-        ca.horzcat(below[0], 1.0, 0.0),
-        ca.horzcat(below[1], below[2], 1.0),
-    )
 
 
 def growth(norm: EnergyNorm, rate: ca.SX) -> ca.SX:
@@ -75,49 +34,15 @@ def growth(norm: EnergyNorm, rate: ca.SX) -> ca.SX:
     rate : w, (3,) [rad/s], body axes
     Source: [EB] eqs. (4), (9), (10).
     """
-    return _largest_of_traceless(_symmetric_part(norm, rate))
+    x, y, z = norm.turned
+    return largest_of_traceless(
+        symmetric(lambda i, j: rate[0] * x[i, j] + rate[1] * y[i, j] + rate[2] * z[i, j])
+    )
 
 
 def growth_in_box(norm: EnergyNorm, box: ca.SX) -> ca.SX:
     """Returns a bound of lambda(w) over all |w_i| <= box_i, (3,) [rad/s]. [EB] eq. (11)."""
-    total = ca.SX.zeros(3, 3)
-    for k in range(3):
-        total += box[k] * ca.fabs(_symmetric_part(norm, ca.SX.eye(3)[:, k]))
-    return ca.norm_fro(total)
-
-
-def _symmetric_part(norm: EnergyNorm, rate: ca.SX) -> ca.SX:
-    """Returns S(w), the symmetric part of -L^-1 [w x] L, (3, 3); its trace is zero. [EB] eq. (4)."""
-    product = -(norm.inverse @ (ca.skew(rate) @ norm.lower))
-    return ca.densify(0.5 * (product + product.T))
-
-
-def largest_eigenvalue(matrix: ca.SX) -> ca.SX:
-    """Returns the largest eigenvalue of a symmetric (3, 3) matrix, from above, within 1e-5 of its spread."""
-    mean = ca.trace(matrix) / 3.0
-    return mean + _largest_of_traceless(matrix - mean * ca.SX.eye(3))
-
-
-def _largest_of_traceless(S: ca.SX) -> ca.SX:
-    """Returns the largest eigenvalue of a symmetric (3, 3) matrix of trace zero, from above.
-
-    Scaled by its largest element first: no power of it under- or overflows.
-    """
-    size = ca.norm_inf(ca.vec(S))
-    unit = S / ca.if_else(size > 0.0, size, 1.0)
-    square = ca.sumsqr(unit) / 6.0
-    radius = ca.sqrt(square)
-    cubed = ca.if_else(size > 0.0, square * radius, 1.0)
-    argument = ca.fmin(ca.fmax(0.5 * ca.det(unit) / cubed, -1.0) + COSINE_SLACK, 1.0)
-    return 2.0 * size * radius * _cosine_of_third(argument)
-
-
-def _cosine_of_third(x: ca.SX) -> ca.SX:
-    """Returns cos(arccos(x)/3) from above, x from -1 to 1. [EB] eq. (10)."""
-    c = ca.fmin(0.5 + 0.5 * ca.sqrt((1.0 + x) / 1.5), 1.0)
-    for _ in range(COSINE_STEPS):
-        c = 0.5 + 0.5 * ca.sqrt((1.0 + x) / (1.0 + c))
-    return c
+    return ca.sqrt(ca.dot(box, norm.in_box @ box))
 
 
 @dataclass(frozen=True)
@@ -158,30 +83,27 @@ class MotionBounds:
         return 0.5 * self.step * self.step * self.bend
 
 
-def motion_bounds(
-    law: RotationLaw, numbers: ca.SX, body: TurnedBody, rate: ca.SX, step: ca.SX
-) -> MotionBounds:
+def motion_bounds(constants: BoundConstants, body: TurnedBody, rate: ca.SX, step: ca.SX) -> MotionBounds:
     """Returns where a law's rate may be over a step, proven. [EB] eqs. (12) to (15).
 
-    numbers : the law's own, of the body's tensor
-    rate    : at the start of the step, (3,) [rad/s]
-    step    : [s], any length
+    rate : at the start of the step, (3,) [rad/s]
+    step : [s], any length
     """
+    law, numbers = constants.law, constants.numbers
     still = ca.SX.zeros(3)
     turned = body.torque - ca.cross(rate, body.spin) if law.gyroscopic_term else body.torque
     slope = law.acceleration(numbers, rate, turned)
     if not law.gyroscopic_term:
         reach = ca.fmax(ca.fabs(rate), ca.fabs(rate + step * slope))
         return MotionBounds(rate, slope, step, reach, ca.fabs(slope), still)
-    push = ca.fabs(law.acceleration(numbers, still, body.torque))
-    pull = ca.fabs(law.gyroscopic(numbers))
+    by_torque = law.acceleration(numbers, still, body.torque)
+    push, pull = ca.fabs(by_torque), constants.pull
     spin = ca.fabs(by_spin(law, numbers, body.spin))
-    norm = norm_of(law.turning(body.inertia))
-    most = ca.norm_2(norm.lower.T @ rate) + step * norm.of_torque(body.torque)
-    reach = most * ca.vertcat(*(ca.norm_2(norm.inverse[:, i]) for i in range(3)))
-    for _ in range(2):  # the first fastest is by energy alone
-        fastest = push + spin @ reach + pull @ _products(law, reach, reach)
-        reach = ca.fmin(reach, ca.fabs(rate) + step * fastest)
+    lower = constants.own_lower.T  # |M| in the norm of D^-1 is |D^-1 M| in that of D
+    most = ca.norm_2(lower @ rate) + step * ca.norm_2(lower @ by_torque)
+    reach = most * constants.own_shares
+    fastest = push + spin @ reach + pull @ _products(law, reach, reach)  # by energy alone
+    reach = ca.fmin(reach, ca.fabs(rate) + step * fastest)
     fastest = push + spin @ reach + pull @ _products(law, reach, reach)
     bend = spin @ fastest + 2.0 * (pull @ _products(law, reach, fastest))
     return MotionBounds(rate, slope, step, reach, fastest, bend)
@@ -203,8 +125,8 @@ def _products(law: RotationLaw, a: ca.SX, b: ca.SX) -> ca.SX:
 
 def largest_growth(norm: EnergyNorm, motion: MotionBounds) -> ca.SX:
     """Returns a bound of lambda(w) [rad/s] over a step. [EB] eq. (16)."""
-    ends = ca.fmax(growth(norm, motion.start), growth(norm, motion.end))
-    return ca.fmin(ends + growth_in_box(norm, motion.curve), growth_in_box(norm, motion.reach))
+    near = growth(norm, motion.start) + growth_in_box(norm, motion.step * motion.fastest)
+    return ca.fmin(near, growth_in_box(norm, motion.reach))
 
 
 def largest_residual(norm: EnergyNorm, truth: TurnedBody, motion: MotionBounds) -> ca.SX:

@@ -10,16 +10,14 @@ from dataclasses import dataclass
 from decimal import Decimal, localcontext
 from functools import cache
 from math import pi
+from typing import Any
 
 import casadi as ca
 
-from supervessel.rotation.error_bound import MotionBounds, TurnedBody, by_spin, cross_of_sizes, norm_of
-from supervessel.rotation.laws import RotationLaw
+from supervessel.rotation.error_bound.carried import MotionBounds, TurnedBody, by_spin
+from supervessel.rotation.error_bound.constants import BoundConstants
 from supervessel.rotation.propagators import dop853
 from supervessel.scene.numbers import EPSILON
-
-LEAST_COUPLING = 0.25
-"""Least g of [EB] eq. (24): a larger one than the law's is right too, and one majorant of attitudes does."""
 
 DEPTH = 512
 """Roundings that follow on each other in one step, at most (counted in tests/model/test_error_bound.py)."""
@@ -36,16 +34,20 @@ RK4_WEIGHTS: Weights = {0: 1.0 / 6.0, 1: 1.0 / 3.0, 2: 1.0 / 3.0, 3: 1.0 / 6.0}
 class Remainder:
     """Constants of [EB] eq. (27): a step is off by at most v C_w z^n in the rate, C_q z^n in the quaternion.
 
-    power : n, one more than the order
+    power : n, one more than the order; an expression where the order is chosen in flight
     limit : largest z for which that is shown
     rate  : C_w
     turn  : C_q
     """
 
-    power: int
+    power: int | ca.SX
     limit: float
     rate: float
-    turn: float
+    turn: float | ca.SX
+
+
+UNKNOWN = Remainder(1, -1.0, 0.0, 0.0)
+"""Of a method whose steps have no bound."""
 
 
 @cache
@@ -55,11 +57,16 @@ def remainder_of(method: str, order: int = 0) -> Remainder:
         return _of_runge_kutta(RK4_STAGES, RK4_WEIGHTS, 4, 0.25)
     if method == "dop853":
         return _of_runge_kutta(dop853.STAGES, dop853.WEIGHTS, 8, 2.0**-6)
+    return remainder_of_taylor(order)
+
+
+def remainder_of_taylor(order: int | ca.SX) -> Remainder:
+    """Returns the constants of a Taylor step, whose order may be an expression. [EB] eq. (26)."""
     limit = 0.5
     return Remainder(order + 1, limit, *_exact_tails(order, limit))
 
 
-def _exact_tails(order: int, z: float) -> tuple[float, float]:
+def _exact_tails(order: Any, z: float) -> tuple[float, Any]:
     """Returns the series of 1/(1 - z) and 1/(1 - z)^2 beyond an order, over z^(order + 1). [EB] eq. (26)."""
     return 1.0 / (1.0 - z), (order + 2.0) / (1.0 - z) + z / (1.0 - z) ** 2
 
@@ -112,47 +119,56 @@ def _times(a: Series, b: Series, size: int) -> Series:
 
 
 def step_error(
-    remainder: Remainder | None, law: RotationLaw, numbers: ca.SX, body: TurnedBody, motion: MotionBounds
+    remainder: Remainder | None,
+    constants: BoundConstants,
+    body: TurnedBody,
+    motion: MotionBounds,
+    estimate: ca.SX | None = None,
 ) -> ca.SX:
     """Returns what a step adds at most to the bound, (2,): attitude [rad], energy norm [J^(1/2)].
 
     remainder : of the method; None for exact free motion, of which rounding alone is counted
     motion    : of the law over the step
-    Infinite where the step is too long for the bound. [EB] eqs. (24), (27), (28).
+    estimate  : (2,) [rad, rad/s], the method's own estimate of its error, taken instead where the step is too
+                long for the bound; None: infinite there
+    [EB] eqs. (24), (27), (28).
     """
-    h, norm = motion.step, norm_of(body.inertia)
-    rounding, quaternion = _rounding(law, body, motion)
-    energy = ca.norm_2(ca.fabs(norm.lower.T) @ rounding)
-    if remainder is not None:
-        coupling = _coupling(law, numbers)
-        push = ca.norm_2(law.acceleration(numbers, ca.SX.zeros(3), body.torque))
-        spin = ca.norm_fro(by_spin(law, numbers, body.spin))
-        shift = ca.fmax(ca.sqrt(push / coupling), 0.5 * spin / coupling)
-        v = ca.norm_2(motion.start) + shift
-        z = coupling * v * h
-        power = ca.if_else(z <= remainder.limit, z, ca.inf) ** remainder.power
-        if law.gyroscopic_term:
-            energy += ca.norm_fro(norm.lower) * (remainder.rate * v * power)
-        quaternion += remainder.turn * power
-    return ca.vertcat(pi * quaternion, energy)
-
-
-def _coupling(law: RotationLaw, numbers: ca.SX) -> ca.SX:
-    """Returns g with |G(a, b)| <= g |a| |b|, at least LEAST_COUPLING. [EB] eq. (24)."""
-    if not law.products:
-        return ca.SX(LEAST_COUPLING)
-    per = ca.vertcat(*(1.0 if i == j else 0.5 for i, j in law.products))
-    square = ca.sum1(ca.sum2(law.gyroscopic(numbers) ** 2 @ ca.diag(per)))
-    return ca.fmax(ca.sqrt(square), LEAST_COUPLING)
-
-
-def _rounding(law: RotationLaw, body: TurnedBody, motion: MotionBounds) -> tuple[ca.SX, ca.SX]:
-    """Returns what rounding of a step leaves, rate (3,) [rad/s] and quaternion. [EB] eq. (28)."""
-    u, h, reach = 0.5 * EPSILON, motion.step, motion.reach
-    force = ca.fabs(body.torque)
+    h, law, numbers = motion.step, constants.law, constants.numbers
+    rounding, quaternion = _rounding(constants, body, motion)
+    energy = constants.heaviest * rounding
+    if remainder is None:
+        return ca.vertcat(pi * quaternion, energy)
+    coupling = constants.coupling
+    push = ca.norm_2(law.acceleration(numbers, ca.SX.zeros(3), body.torque))
+    spin = ca.norm_fro(by_spin(law, numbers, body.spin))
+    v = ca.norm_2(motion.start) + ca.fmax(ca.sqrt(push / coupling), 0.5 * spin / coupling)
+    z = coupling * v * h
+    known = z <= remainder.limit
+    power = ca.if_else(known, _power(z, remainder.power), ca.inf if estimate is None else 0.0)
     if law.gyroscopic_term:
-        force += cross_of_sizes(reach, ca.fabs(body.inertia) @ reach + ca.fabs(body.spin))
-    inertia = law.turning(body.inertia) if law.gyroscopic_term else law.keeping(body.inertia)
-    acceleration = ca.fabs(ca.inv_minor(inertia)) @ force
-    rate = u * (4.0 * reach + (DEPTH * h) * acceleration)
-    return rate, u * (8.0 + (DEPTH * h) * ca.norm_2(reach)) + 0.5 * h * ca.norm_2(rate)
+        energy += constants.heaviest * (remainder.rate * v * power)
+    angle = pi * (quaternion + remainder.turn * power)
+    if estimate is not None:
+        angle += ca.if_else(known, 0.0, estimate[0])
+        energy += ca.if_else(known, 0.0, constants.heaviest * estimate[1])
+    return ca.vertcat(angle, energy)
+
+
+def _power(z: ca.SX, exponent: int | ca.SX) -> ca.SX:
+    """Returns a power by products where the exponent is a number: C's pow costs more."""
+    if isinstance(exponent, ca.SX):
+        return z**exponent
+    if exponent == 1:
+        return z
+    half = _power(z, exponent // 2)
+    return half * half * z if exponent % 2 else half * half
+
+
+def _rounding(constants: BoundConstants, body: TurnedBody, motion: MotionBounds) -> tuple[ca.SX, ca.SX]:
+    """Returns what rounding of a step leaves, rate [rad/s] and quaternion. [EB] eq. (28)."""
+    u, h, speed = 0.5 * EPSILON, motion.step, ca.norm_2(motion.reach)
+    force = ca.norm_2(body.torque)
+    if constants.law.gyroscopic_term:
+        force += speed * (ca.norm_fro(body.inertia) * speed + ca.norm_2(body.spin))
+    rate = u * (4.0 * speed + (DEPTH * h) * (constants.lightness * force))
+    return rate, u * (8.0 + (DEPTH * h) * speed) + 0.5 * h * rate
