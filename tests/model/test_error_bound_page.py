@@ -98,7 +98,7 @@ def test_cosine_from_above_after_an_even_number_of_steps() -> None:
         right = mp.cos(mp.acos(x) / 3)
         c = min(mp.mpf(1), (1 + mp.sqrt((1 + x) * 2 / 3)) / 2)
         assert c >= right - CLOSE
-        for n in range(1, error_bound.COSINE_STEPS + 1):
+        for n in range(1, constants.COSINE_STEPS + 1):
             c = (1 + mp.sqrt((1 + x) / (1 + c))) / 2
             assert (c - right) * (-1) ** n >= -CLOSE
         worst = max(worst, c - right)
