@@ -14,7 +14,7 @@ from fmu_build.flight.choices import BEST, Choice, reference_choices
 from fmu_build.flight.results import are_numbers, keep, place_of, read
 from fmu_build.flight.workshop import workshop
 from supervessel.problems import AccuracyError
-from supervessel.scene.schema import CHOSEN, Accuracy, Rotation, Scene
+from supervessel.scene.schema import CHOSEN, Accuracy, Outputs, Rotation, Scene
 
 CLAIM = (
     "From the scene's start, in communication steps of that length, with inputs anywhere in their ranges and "
@@ -39,6 +39,7 @@ ABOUT = {
     "doubt": "largest distance of the two ways to the exact motion, in truth",
     "operations": "counted, of a communication step on an average over the flight in which it costs most",
     "worst": "history of the largest error of what was chosen, and what it holds, null where inputs move",
+    "watched": "whether the output error_bound is there because the accuracy is not proven",
     "histories": "what inputs do in each flight",
     "steps, looked_at": "communication steps of a flight, and at how many of their ends errors were taken",
     "rows_drawn, rows_senseless": "values of all inputs that were drawn; those that the FMU discards",
@@ -48,6 +49,9 @@ ABOUT = {
     "max_angle_step": "rad",
 }
 
+
+WATCH = "error_bound"
+"""The output that watches a flight whose accuracy is not proven."""
 
 COUNTS = ("steps", "looked_at", "rows_drawn", "rows_senseless")
 """Keys of the evidence that are numbers of things."""
@@ -60,9 +64,10 @@ def choose(scene: Scene, progress: Progress = lambda _: None) -> tuple[Scene, di
         raise ValueError(f'scene "{scene.name}" has no [accuracy]: nothing is to be chosen')
     given = scene.rotation.model_dump(exclude_unset=True)
     opened = {key: value for key, value in given.items() if key not in CHOSEN}
-    whole = scene.model_copy(update={"rotation": Rotation.model_validate(opened)})
+    whole = _as_flown(scene, Rotation.model_validate(opened))
     place = place_of("accuracy", whole, "choice")
-    kept = read(place, lambda kept: _is_evidence(kept, whole, accuracy))
+    asked = accuracy.model_dump(mode="json", exclude={"error_bound"})
+    kept = read(place, lambda kept: _is_evidence(kept, whole, asked))
     if kept is None:
         kept = _chosen(whole, accuracy, progress)
         keep(place, kept)
@@ -74,7 +79,22 @@ def choose(scene: Scene, progress: Progress = lambda _: None) -> tuple[Scene, di
     chosen = Rotation.model_validate(rotation)
     if scene.is_chosen and scene.rotation != chosen:
         raise AccuracyError("accuracy: [rotation] has been changed since it was chosen")
-    return scene.model_copy(update={"rotation": chosen}), kept
+    watched = accuracy.error_bound and kept["grade"]["name"] != PROVEN
+    outputs = _watching(scene.outputs) if watched else scene.outputs
+    return scene.model_copy(update={"rotation": chosen, "outputs": outputs}), kept | {"watched": watched}
+
+
+def _watching(outputs: Outputs) -> Outputs:
+    """Returns outputs with error_bound among them."""
+    return Outputs(names=tuple(dict.fromkeys((*outputs.names, WATCH))))
+
+
+def _as_flown(scene: Scene, rotation: Rotation) -> Scene:
+    """Returns a scene as candidates are made of it: what watches the flight decides nothing."""
+    names = tuple(name for name in scene.outputs.names if name != WATCH)
+    accuracy = scene.accuracy and scene.accuracy.model_copy(update={"error_bound": True})
+    outputs = Outputs(names=names) if names else scene.outputs
+    return scene.model_copy(update={"rotation": rotation, "accuracy": accuracy, "outputs": outputs})
 
 
 def _chosen(scene: Scene, accuracy: Accuracy, progress: Progress) -> dict[str, Any]:
@@ -91,7 +111,7 @@ def _chosen(scene: Scene, accuracy: Accuracy, progress: Progress) -> dict[str, A
     return {
         "about": ABOUT,
         "scene": scene.name,
-        "asked": accuracy.model_dump(mode="json"),
+        "asked": accuracy.model_dump(mode="json", exclude={"error_bound"}),
         "claim": f"{CLAIM} {GRADES[grade.name]}",
         "grade": {
             "name": grade.name,
@@ -134,7 +154,7 @@ def _chosen(scene: Scene, accuracy: Accuracy, progress: Progress) -> dict[str, A
     }
 
 
-def _is_evidence(kept: Any, scene: Scene, accuracy: Accuracy) -> bool:
+def _is_evidence(kept: Any, scene: Scene, asked: Mapping[str, Any]) -> bool:
     """Whether what JSON has given is evidence about this scene, in every part, for the choice in it.
 
     Where a part is missing, or has another form, that may also show as an error.
@@ -165,7 +185,7 @@ def _is_evidence(kept: Any, scene: Scene, accuracy: Accuracy) -> bool:
     return (
         (kept["about"], kept["scene"], kept["claim"]) == (ABOUT, scene.name, claim)
         and (kept["not_covered"], kept["margin"]) == (list(NOT_COVERED), MARGIN)
-        and kept["asked"] == accuracy.model_dump(mode="json")
+        and kept["asked"] == asked
         and [(one["enough"], one["refused"]) for one in chosen] == [(True, None)]
         and are_numbers(numbers)
         and all(isinstance(text, str) for text in texts)
@@ -226,7 +246,8 @@ def said(evidence: Mapping[str, Any]) -> str:
         found += f", {evidence['rate']:.1e} rad/s of {asked['rate']:g} rad/s"
     count = len(evidence["histories"])
     flown = f"largest error in {count} flight{'s' * (count > 1)} of {asked['horizon']:g} s"
-    return f"{settings}: {_graded(evidence['grade'])}; {flown} {found}"
+    watched = "; the output error_bound watches the flight" if evidence["watched"] else ""
+    return f"{settings}: {_graded(evidence['grade'])}; {flown} {found}{watched}"
 
 
 def _graded(grade: Mapping[str, Any]) -> str:

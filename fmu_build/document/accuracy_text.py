@@ -46,6 +46,7 @@ def _asked_and_found(evidence: Mapping[str, Any]) -> list[tuple[Cell, ...]]:
         ("bound of law and method [rad], [rad/s]", _bounds(evidence["grade"])),
         ("in the way of a better grade", evidence["grade"]["why"] or "nothing"),
         ("range whose narrowing helps most", evidence["grade"]["narrow"] or "none"),
+        ("watched in flight", "by the output error_bound" if evidence["watched"] else "no"),
         ("margin that flights keep", evidence["margin"]),
         ("chosen", _settings(evidence["choice"])),
         ("its largest error in flight [rad], [rad/s]", (evidence["attitude"], evidence["rate"])),

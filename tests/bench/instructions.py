@@ -63,7 +63,17 @@ def scenes() -> dict[str, Scene]:
     many = station(100, [f"v{i}" for i in range(100)])
     many["inputs"]["pose"] = [port for dock in many["docks"] for port in dock["ports"]]
     many["outputs"] = {"names": ["mass"]}
-    found = {f"ISS with a ship, {name}": parse_scene(scene) for name, scene in raw.items()}
+    names = ("mass", "attitude", "error_bound")
+    watched = {
+        f"{law}, {name}, error_bound": variant(scene, {"rotation.law": law, "outputs": {"names": [*names]}})
+        for law, name in (("none", "rk4"), ("principal", "rk4"), ("tensor", "rk4"), ("tensor", "taylor"))
+        for scene in [raw[name]]
+    }
+    watched |= {
+        f"{law}, rk4": variant(raw["rk4"], {"rotation.law": law, "outputs": {"names": ["mass", "attitude"]}})
+        for law in ("none", "principal", "tensor")
+    }
+    found = {f"ISS with a ship, {name}": parse_scene(scene) for name, scene in (raw | watched).items()}
     return {"examples/iss_dg.toml": load_scene(SCENE)} | found | {"100 vessels": parse_scene(many)}
 
 

@@ -10,7 +10,7 @@ from supervessel.derivatives import GivenDerivative
 from supervessel.layout import stacked
 from supervessel.rotation.attitude import rotation_matrix
 from supervessel.rotation.dynamics import Dynamics
-from supervessel.rotation.error_bound.constants import bound_constants, stored
+from supervessel.rotation.error_bound.constants import constants_of, stored
 from supervessel.rotation.laws import LAWS, principal_products
 from supervessel.rotation.principal import principal, principal_forward, quaternion_of_axes
 from supervessel.rotation.propagators import Plan
@@ -59,7 +59,7 @@ def axes_graph(resolved: ResolvedScene, plan: Plan, dynamics: Dynamics, products
     elif in_series:
         parts["series"] = ca.diag(products) if products.numel() else ca.SX(0, 1)
     if "error_bound" in resolved.scene.outputs.names:
-        parts["bound"] = stored(bound_constants(dynamics.law, dynamics.numbers, inertia))
+        parts["bound"] = stored(constants_of(dynamics))
     slices, a = stacked(parts)
     return AxesGraph(a, slices)
 

@@ -20,8 +20,9 @@ class Dynamics:
     numbers     : the law's own numbers, from `RotationLaw.prepare`
     inertia     : J, (3, 3) [kg m2]
     torque      : M, sum of all torques, (3,) [N m]
-    spin        : h, angular momentum of the parts that move relative to body axes, (3,) [N m s]; None where
-                  no port moves or the law has no gyroscopic term
+    moving      : h, angular momentum of the parts that move relative to body axes, (3,) [N m s]; None where
+                  no port moves
+    spin        : the same where the law has a gyroscopic term, else None
     spin_square : [rad2/s2], square of a bound of |J^-1 (omega x h)|/|omega|; None where spin is None
     """
 
@@ -29,6 +30,7 @@ class Dynamics:
     numbers: ca.SX
     inertia: ca.SX
     torque: ca.SX
+    moving: ca.SX | None
     spin: ca.SX | None
     spin_square: ca.SX | None
 
@@ -68,6 +70,7 @@ def dynamics_of(resolved: ResolvedScene, parts: Mapping[str, ca.SX], u: ca.SX) -
         numbers=parts["law"],
         inertia=from_upper_triangle(parts["inertia"]),
         torque=torque_about_barycentre(resolved, parts, u),
+        moving=parts["momentum"][:3] if "momentum" in parts else None,
         spin=parts["momentum"][:3] if spins else None,
         spin_square=parts["momentum"][3] if spins else None,
     )

@@ -150,18 +150,24 @@ def _tensor(numbers: ca.SX, omega: ca.SX, torque: ca.SX) -> ca.SX:
 
 
 def _tensor_products(numbers: ca.SX) -> ca.SX:
-    """Returns J^-1 times -(omega x J omega) as a linear map of the products, (3, 6).
+    """Returns J^-1 times -(omega x J omega) as a linear map of the products, (3, 6)."""
+    J, inverse = from_upper_triangle(numbers[:6]), from_upper_triangle(numbers[6:12])
+    return inverse @ gyroscopic_torque(J)
 
+
+def gyroscopic_torque(J: ca.SX) -> ca.SX:
+    """Returns -(omega x J omega) as a linear map, (3, 6), of MIXED_PRODUCTS and SQUARES.
+
+    J : (3, 3)
     Written out, the moments occur as differences only: a nearly spherical body loses no digits.
     """
-    J, inverse = from_upper_triangle(numbers[:6]), from_upper_triangle(numbers[6:12])
     xy, xz, yz = J[0, 1], J[0, 2], J[1, 2]
     rows = (
         (J[1, 1] - J[2, 2], xy, -xz, 0.0, -yz, yz),
         (-xy, J[2, 2] - J[0, 0], yz, xz, 0.0, -xz),
         (xz, -yz, J[0, 0] - J[1, 1], -xy, xy, 0.0),
     )
-    return inverse @ ca.vertcat(*(ca.horzcat(*row) for row in rows))
+    return ca.SX(ca.vertcat(*(ca.horzcat(*row) for row in rows)))
 
 
 def principal_products(moments: ca.SX) -> ca.SX:

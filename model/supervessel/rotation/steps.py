@@ -6,6 +6,7 @@ import casadi as ca
 
 from supervessel.rotation.axes import AxesGraph
 from supervessel.rotation.dynamics import Dynamics
+from supervessel.rotation.error_bound.remainder import has_sure_remainder
 from supervessel.rotation.propagators import PROPAGATORS, Plan
 from supervessel.rotation.propagators.bound import fastest_square, longest_step, smooth_length
 from supervessel.rotation.propagators.exact import free_functions, free_functions_of_start
@@ -48,7 +49,7 @@ def step_functions(
     """
     x, h = symbols[0], ca.SX.sym("h")
     shown = "error_estimate" in scene.outputs.names
-    estimated = shown or "error_bound" in scene.outputs.names
+    estimated = shown or ("error_bound" in scene.outputs.names and not has_sure_remainder(scene.rotation))
     motion = StepSymbols(
         x,
         dynamics.state_rate,

@@ -200,16 +200,18 @@ class Experiment(Table):
 class Accuracy(Table):
     """How exact the motion shall be; law, propagator and its setting are then chosen.
 
-    attitude : largest error of the attitude [rad]
-    rate     : largest error of the angular velocity [rad/s]; None: any
-    horizon  : time from the start until which they hold [s]
-    step     : communication step [s]
+    attitude    : largest error of the attitude [rad]
+    rate        : largest error of the angular velocity [rad/s]; None: any
+    horizon     : time from the start until which they hold [s]
+    step        : communication step [s]
+    error_bound : whether the output error_bound watches the flight where the accuracy is not proven
     """
 
     attitude: AttitudeError
     rate: RateError | None = None
     horizon: Seconds
     step: Seconds
+    error_bound: bool = True
 
 
 class Outputs(Table):

@@ -8,9 +8,9 @@ from supervessel.composite.inertia import from_upper_triangle
 from supervessel.equations import Equations, composite_slices
 from supervessel.rotation.changes import contact_momentum, each_motion, stage_composites, stages
 from supervessel.rotation.dynamics import dynamics_of
-from supervessel.rotation.error_bound.carried import TurnedBody, kept_momentum, kept_rate
-from supervessel.rotation.error_bound.constants import bound_constants, norm_of
-from supervessel.rotation.error_bound.functions import bound_after_step, keeps_in_truth, spin_of
+from supervessel.rotation.error_bound.carried import kept_momentum, kept_rate
+from supervessel.rotation.error_bound.constants import constants_of, norm_of
+from supervessel.rotation.error_bound.functions import body_of, bound_after_step, keeps_in_truth
 from supervessel.rotation.error_bound.remainder import Remainder, remainder_of, step_error
 from supervessel.rotation.propagators import PROPAGATORS
 from supervessel.rotation.propagators.taylor import taylor_order
@@ -27,8 +27,7 @@ def bound_over_step(model: Equations, parts: Parts, bound: ca.SX, at: tuple[ca.S
     """
     x, u, h = at
     dynamics = dynamics_of(model.resolved, parts, u)
-    constants = bound_constants(dynamics.law, dynamics.numbers, dynamics.inertia)
-    body = TurnedBody(dynamics.inertia, dynamics.torque, spin_of(parts))
+    constants, body = constants_of(dynamics), body_of(dynamics)
     found, motion = bound_after_step(constants, body, x, h, bound)
     return found + step_error(method_remainder(model), constants, body, motion)
 

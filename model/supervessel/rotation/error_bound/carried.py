@@ -22,7 +22,7 @@ from supervessel.rotation.error_bound.constants import (
     largest_of_traceless,
     norm_of,
 )
-from supervessel.rotation.laws import RotationLaw
+from supervessel.rotation.laws import MIXED_PRODUCTS, SQUARES, RotationLaw
 
 INFLATION = 1.0 + 2.0**-44
 """What sums and products of fewer than 500 positive terms may lose to rounding."""
@@ -40,11 +40,6 @@ def growth(norm: EnergyNorm, rate: ca.SX) -> ca.SX:
     )
 
 
-def growth_in_box(norm: EnergyNorm, box: ca.SX) -> ca.SX:
-    """Returns a bound of lambda(w) over all |w_i| <= box_i, (3,) [rad/s]. [EB] eq. (11)."""
-    return ca.sqrt(ca.dot(box, norm.in_box @ box))
-
-
 @dataclass(frozen=True)
 class TurnedBody:
     """What turns a body: tensor J, (3, 3) [kg m2], torque M, (3,) [N m], spin h, (3,) [N m s]; body axes."""
@@ -56,105 +51,98 @@ class TurnedBody:
 
 @dataclass(frozen=True)
 class MotionBounds:
-    """Where the rate w of a law may be during a step h: w_0 + t w_0' within `curve`, and within `reach`.
+    """Where the rate w of a law may be during a step h, by lengths of vectors.
 
-    start, slope : w_0, (3,) [rad/s], and w_0', (3,) [rad/s2]
+    start        : w_0, (3,) [rad/s]
     step         : h [s]
-    reach        : |w_i| <= reach_i, (3,) [rad/s]
-    fastest      : |w_i'| <= fastest_i, (3,) [rad/s2]
-    bend         : |w_i''| <= bend_i, (3,) [rad/s3]; zero for laws without a gyroscopic term
+    speed        : |w_0| [rad/s]
+    reach        : |w| <= reach [rad/s]
+    fastest      : |w'| <= fastest [rad/s2]
+    scale, share : v [rad/s] and z of [EB] eq. (24)
     """
 
     start: ca.SX
-    slope: ca.SX
     step: ca.SX
+    speed: ca.SX
     reach: ca.SX
     fastest: ca.SX
-    bend: ca.SX
+    scale: ca.SX
+    share: ca.SX
 
     @property
-    def end(self) -> ca.SX:
-        """w_0 + h w_0', (3,) [rad/s]."""
-        return self.start + self.step * self.slope
-
-    @property
-    def curve(self) -> ca.SX:
-        """What w is off that line by at most, element by element, (3,) [rad/s]."""
-        return 0.5 * self.step * self.step * self.bend
+    def away(self) -> ca.SX:
+        """|w - w_0| is at most that [rad/s]. [EB] eq. (15)."""
+        return ca.fmin(self.step * self.fastest, self.speed + self.reach)
 
 
 def motion_bounds(constants: BoundConstants, body: TurnedBody, rate: ca.SX, step: ca.SX) -> MotionBounds:
-    """Returns where a law's rate may be over a step, proven. [EB] eqs. (12) to (15).
+    """Returns where a law's rate may be over a step, proven. [EB] eqs. (12) to (15), (24).
 
     rate : at the start of the step, (3,) [rad/s]
     step : [s], any length
     """
-    law, numbers = constants.law, constants.numbers
-    still = ca.SX.zeros(3)
-    turned = body.torque - ca.cross(rate, body.spin) if law.gyroscopic_term else body.torque
-    slope = law.acceleration(numbers, rate, turned)
+    law, numbers, g = constants.law, constants.numbers, constants.coupling
+    by_torque = law.acceleration(numbers, ca.SX.zeros(3), body.torque)
+    push, speed = ca.norm_2(by_torque), ca.norm_2(rate)
     if not law.gyroscopic_term:
-        reach = ca.fmax(ca.fabs(rate), ca.fabs(rate + step * slope))
-        return MotionBounds(rate, slope, step, reach, ca.fabs(slope), still)
-    by_torque = law.acceleration(numbers, still, body.torque)
-    push, pull = ca.fabs(by_torque), constants.pull
-    spin = ca.fabs(by_spin(law, numbers, body.spin))
-    lower = constants.own_lower.T  # |M| in the norm of D^-1 is |D^-1 M| in that of D
-    most = ca.norm_2(lower @ rate) + step * ca.norm_2(lower @ by_torque)
-    reach = most * constants.own_shares
-    fastest = push + spin @ reach + pull @ _products(law, reach, reach)  # by energy alone
-    reach = ca.fmin(reach, ca.fabs(rate) + step * fastest)
-    fastest = push + spin @ reach + pull @ _products(law, reach, reach)
-    bend = spin @ fastest + 2.0 * (pull @ _products(law, reach, fastest))
-    return MotionBounds(rate, slope, step, reach, fastest, bend)
+        v = speed + ca.sqrt(push / g)
+        reach = speed + step * push
+        return MotionBounds(rate, step, speed, reach, push, v, g * v * step)
+    spin = ca.norm_fro(by_spin(law, numbers, body.spin))
+    v = speed + ca.fmax(ca.sqrt(push / g), 0.5 * spin / g)
+    z = g * v * step
+    near = speed + v * z / (1.0 - ca.fmin(z, 0.5))
+    energy = ca.sqrt(ca.dot(rate, law.turning(body.inertia) @ rate))
+    energy += step * ca.sqrt(ca.fmax(ca.dot(body.torque, by_torque), 0.0))
+    reach = ca.fmin(ca.if_else(z <= 0.5, near, ca.inf), constants.own_share * energy)
+    fastest = push + reach * (spin + g * reach)
+    return MotionBounds(rate, step, speed, reach, fastest, v, z)
 
 
 def by_spin(law: RotationLaw, numbers: ca.SX, spin: ca.SX) -> ca.SX:
     """Returns B, (3, 3) [1/s], of the acceleration B w that the spin of moving parts adds."""
-    if not law.gyroscopic_term:
-        return ca.SX.zeros(3, 3)
     still = ca.SX.zeros(3)
     columns = (law.acceleration(numbers, still, ca.cross(spin, axis)) for axis in ca.horzsplit(ca.SX.eye(3)))
     return ca.densify(ca.horzcat(*columns))
 
 
-def _products(law: RotationLaw, a: ca.SX, b: ca.SX) -> ca.SX:
-    """Returns (a_i b_j + a_j b_i)/2 for the law's products of rates, (n,)."""
-    return ca.vertcat(*(0.5 * (a[i] * b[j] + a[j] * b[i]) for i, j in law.products))
+CANCELLED = 2.0**-47
+"""Share of the largest growth's square that rounding may leave where its terms cancel: 32 u."""
 
 
-def largest_growth(norm: EnergyNorm, motion: MotionBounds) -> ca.SX:
-    """Returns a bound of lambda(w) [rad/s] over a step. [EB] eq. (16)."""
-    near = growth(norm, motion.start) + growth_in_box(norm, motion.step * motion.fastest)
-    return ca.fmin(near, growth_in_box(norm, motion.reach))
+def largest_growth(constants: BoundConstants, motion: MotionBounds) -> ca.SX:
+    """Returns a bound of lambda(w) [rad/s] over a step. [EB] eq. (16).
+
+    Under the exact law, which leaves nothing out, lambda(w_0) is bounded with fewer operations.
+    """
+    norm, start = constants.norm, motion.start
+    if constants.left_out is None:
+        cancelled = CANCELLED * (norm.steepest * motion.speed) ** 2
+        first = ca.sqrt(ca.fmax(2.0 / 3.0 * ca.dot(start, norm.squares @ start), 0.0) + cancelled)
+    else:
+        first = growth(norm, start)
+    return ca.fmin(first + norm.steepest * motion.away, norm.steepest * motion.reach)
 
 
-def largest_residual(norm: EnergyNorm, truth: TurnedBody, motion: MotionBounds) -> ca.SX:
-    """Returns a bound of |L^-1 delta| [J^(1/2)/s] over a step. [EB] eqs. (3), (17) to (19).
+def largest_residual(constants: BoundConstants, body: TurnedBody, motion: MotionBounds) -> ca.SX:
+    """Returns a bound of |L^-1 delta| [J^(1/2)/s] over a step, 0 for the exact law. [EB] eqs. (17) to (19).
 
-    truth  : the body with the inputs as they are; the motion may be that of inputs frozen at other values
     motion : of the cheap law
     """
-    J, M, h = truth.inertia, truth.torque, truth.spin
-    start, end = motion.start, motion.end
-    first, last = J @ start + h, J @ end + h
-    thrust = J @ motion.slope - M
-    middle = 0.5 * (ca.cross(start, last) + ca.cross(end, first))
-    points = (thrust + ca.cross(start, first), thrust + middle, thrust + ca.cross(end, last))
-    on_line = ca.mmax(ca.vertcat(*(norm.of_torque(point) for point in points)))
-    heavy, inverse, curve = ca.fabs(J), ca.fabs(norm.inverse), motion.curve
-    line = ca.fmax(ca.fabs(start), ca.fabs(end))
-    aside = heavy @ (motion.step * motion.bend)
-    aside += cross_of_sizes(line, heavy @ curve)
-    aside += cross_of_sizes(curve, heavy @ (line + curve) + ca.fabs(h))
-    whole = heavy @ motion.fastest + ca.fabs(M)
-    whole += cross_of_sizes(motion.reach, heavy @ motion.reach + ca.fabs(h))
-    return ca.fmin(on_line + ca.norm_2(inverse @ aside), ca.norm_2(inverse @ whole))
+    left_out, w, away = constants.left_out, motion.start, motion.away
+    if left_out is None:
+        return ca.SX(0.0)
+    products = ca.vertcat(*(w[i] * w[j] for i, j in (*MIXED_PRODUCTS, *SQUARES)))
+    first = left_out.by_torque @ body.torque + left_out.by_rates @ products
+    slope = left_out.bend * (2.0 * motion.speed + away)
+    if left_out.by_rate is not None:
+        first += left_out.by_rate @ w
+        slope += ca.norm_fro(left_out.by_rate)
+    return ca.norm_2(first) + slope * away
 
 
-def cross_of_sizes(a: ca.SX, b: ca.SX) -> ca.SX:
-    """Returns bounds of the elements of a cross product, (3,), of bounds of its factors' elements."""
-    return ca.vertcat(a[1] * b[2] + a[2] * b[1], a[2] * b[0] + a[0] * b[2], a[0] * b[1] + a[1] * b[0])
+STEEPEST = 64.0
+"""Exponent of growth over a step beyond which the bound is infinite: e^64 leaves nothing to know."""
 
 
 def carried(bound: ca.SX, rate_share: ca.SX, growth: ca.SX, residual: ca.SX, step: ca.SX) -> ca.SX:
@@ -164,15 +152,11 @@ def carried(bound: ca.SX, rate_share: ca.SX, growth: ca.SX, residual: ca.SX, ste
     growth     : largest lambda over the step [rad/s], at least 0
     residual   : largest |L^-1 delta| over the step [J^(1/2)/s]
     """
-    rise = ca.exp(growth * step)
-    energy = _times(bound[1], rise) + _times(residual * step, 0.5 * (1.0 + rise))
+    exponent = growth * step
+    rise = ca.exp(ca.fmin(exponent, STEEPEST))
+    energy = bound[1] * rise + residual * step * (0.5 * (1.0 + rise))
     angle = bound[0] + rate_share * step * (0.5 * (bound[1] + energy))
-    return INFLATION * ca.vertcat(angle, energy)
-
-
-def _times(value: ca.SX, factor: ca.SX) -> ca.SX:
-    """Returns value times factor; 0 where the value is 0, also where the factor is too large for a double."""
-    return ca.if_else(value > 0.0, value * factor, 0.0)
+    return INFLATION * ca.vertcat(angle, energy) + ca.if_else(exponent > STEEPEST, ca.inf, 0.0)
 
 
 def kept_rate(energy: ca.SX, before: ca.SX, after: ca.SX) -> ca.SX:

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import casadi as ca
 
 from supervessel.composite.inertia import UPPER_TRIANGLE, from_upper_triangle, ldl, symmetric
-from supervessel.rotation.laws import RotationLaw
+from supervessel.rotation.dynamics import Dynamics
+from supervessel.rotation.laws import LAWS, RotationLaw, gyroscopic_torque
 
 COSINE_STEPS = 4
 """Even number of steps of [EB] eq. (10); they leave at most 1e-5 of the cosine."""
@@ -27,7 +28,8 @@ class EnergyNorm:
     inverse    : L^-1, (3, 3)
     rate_share : the least k with |e| <= k |e|_J: 1/sqrt(least moment), from above, [EB] eq. (6)
     turned     : S(e_k), (3, 3), of the three axes e_k, [EB] eq. (4)
-    in_box     : (3, 3), sums of the products of the sizes of two S's elements, [EB] eq. (11)
+    squares    : Q, (3, 3): the square of the Frobenius norm of S(w) is w . Q w
+    steepest   : the growth is at most this times the length of a rate, [EB] eq. (11)
     """
 
     inertia: ca.SX
@@ -35,7 +37,8 @@ class EnergyNorm:
     inverse: ca.SX
     rate_share: ca.SX
     turned: tuple[ca.SX, ca.SX, ca.SX]
-    in_box: ca.SX
+    squares: ca.SX
+    steepest: ca.SX
 
     def of_torque(self, torque: ca.SX) -> ca.SX:
         """Returns |L^-1 torque|, the energy norm of J^-1 torque."""
@@ -54,11 +57,18 @@ def norm_of(inertia: ca.SX, *, singular: bool = False) -> EnergyNorm:
     L = ca.densify(_unit_lower(lower) @ ca.diag(roots))
     m21, m31, m32 = -lower[0], lower[0] * lower[2] - lower[1], -lower[2]
     inverse = ca.densify(ca.diag(1.0 / roots) @ _unit_lower(ca.vertcat(m21, m31, m32)))
-    share = ca.sqrt(largest_eigenvalue(inverse.T @ inverse))
-    x, y, z = (_symmetric_part(inverse, axis, L) for axis in ca.horzsplit(ca.SX.eye(3)))
-    sizes = [ca.vec(ca.fabs(S)) for S in (x, y, z)]
-    in_box = symmetric(lambda i, j: ca.dot(sizes[i], sizes[j]))
-    return EnergyNorm(inertia, L, inverse, share, (x, y, z), in_box)
+    turned = [_symmetric_part(inverse, axis, L) for axis in ca.horzsplit(ca.SX.eye(3))]
+    columns = [ca.vec(S) for S in turned]
+    squares = symmetric(lambda i, j: ca.dot(columns[i], columns[j]))
+    return EnergyNorm(
+        inertia=inertia,
+        lower=L,
+        inverse=inverse,
+        rate_share=ca.sqrt(largest_eigenvalue(inverse.T @ inverse)),
+        turned=(turned[0], turned[1], turned[2]),
+        squares=squares,
+        steepest=ca.sqrt(2.0 / 3.0 * largest_eigenvalue(squares)),
+    )
 
 
 def _unit_lower(below: ca.SX) -> ca.SX:
@@ -106,134 +116,150 @@ def _cosine_of_third(x: ca.SX) -> ca.SX:
 
 
 @dataclass(frozen=True)
+class LeftOut:
+    """What a law leaves unbalanced in the full equation, in the energy norm. [EB] eqs. (17), (18).
+
+    by_torque : L^-1 (J D^-1 - 1), (3, 3), times the torque
+    by_rate   : linear map of w, (3, 3), of the spin of moving parts; None where none moves
+    by_rates  : linear map of MIXED_PRODUCTS and SQUARES, (3, 6)
+    bend      : rho with |by_rates(a, b)| <= rho |a| |b|
+    """
+
+    by_torque: ca.SX
+    by_rate: ca.SX | None
+    by_rates: ca.SX
+    bend: ca.SX
+
+
+@dataclass(frozen=True)
 class BoundConstants:
     """What the bound needs of a composite, computed when that changes.
 
-    law        : the law of the cheap motion
-    numbers    : the law's own, of the tensor J
-    norm       : of J
-    own_lower  : L_D, (3, 3), of the tensor D = L_D L_D^T that the law turns; (0, 0) where it turns none
-    own_shares : sqrt((D^-1)_ii), (3,) [1/sqrt(kg m2)], [EB] eq. (13); (0,) likewise
-    pull       : sizes of the elements of G, the law's map of products of rates, (3, n)
-    coupling   : g of [EB] eq. (24), at least LEAST_COUPLING
-    lightness  : Frobenius norm of the inverse of the law's own tensor [1/(kg m2)]
-    heaviest   : Frobenius norm of L
+    law       : the law of the cheap motion
+    numbers   : the law's own, of the tensor J
+    norm      : of J
+    left_out  : by the law; None of the law that leaves nothing out
+    own_share : 1/sqrt(least moment) of the tensor D that the law turns, from above, [EB] eq. (13)
+    coupling  : g of [EB] eq. (23), at least LEAST_COUPLING
+    lightness : Frobenius norm of the inverse of the law's own tensor [1/(kg m2)]
+    heaviest  : Frobenius norm of J [kg m2]
     """
 
     law: RotationLaw
     numbers: ca.SX
     norm: EnergyNorm
-    own_lower: ca.SX
-    own_shares: ca.SX
-    pull: ca.SX
+    left_out: LeftOut | None
+    own_share: ca.SX
     coupling: ca.SX
     lightness: ca.SX
     heaviest: ca.SX
 
 
 LEAST_COUPLING = 0.25
-"""Least g of [EB] eq. (24): a larger one than the law's is right too, and one majorant of attitudes does."""
+"""Least g of [EB] eq. (23): a larger one than the law's is right too, and one majorant of attitudes does."""
 
 
-def bound_constants(law: RotationLaw, numbers: ca.SX, inertia: ca.SX) -> BoundConstants:
+def constants_of(dynamics: Dynamics) -> BoundConstants:
+    """Returns what the bound needs of a scene's composite."""
+    return bound_constants(dynamics.law, dynamics.numbers, dynamics.inertia, dynamics.moving)
+
+
+def bound_constants(law: RotationLaw, numbers: ca.SX, inertia: ca.SX, spin: ca.SX | None) -> BoundConstants:
     """Returns what the bound needs of a composite.
 
     numbers : the law's own, of the tensor
     inertia : (3, 3) [kg m2]
+    spin    : angular momentum of the parts that move in body axes, (3,) [N m s]; None where none moves
     """
-    singular = not (
-        law.products or numbers.numel()
-    )  # the law that takes a mass point, whose moments are zero
-    norm = norm_of(inertia, singular=singular)
-    own_lower, own_shares = ca.SX(0, 0), ca.SX(0, 1)
-    if law.gyroscopic_term:
-        own = norm_of(law.turning(inertia))
-        own_lower = own.lower
-        own_shares = ca.vertcat(*(ca.norm_2(own.inverse[:, i]) for i in range(3)))
-    kept = law.turning(inertia) if law.gyroscopic_term else law.keeping(inertia)
-    lightness = ca.SX(0.0) if singular else ca.norm_fro(ca.inv_minor(kept))
-    products = law.gyroscopic(numbers)
+    may_be_point = law is LAWS["none"]
+    norm = norm_of(inertia, singular=may_be_point)
+    own = law.turning(inertia) if law.gyroscopic_term else law.keeping(inertia)
+    inverse = ca.SX.zeros(3, 3) if may_be_point else ca.inv_minor(own)
     return BoundConstants(
         law=law,
         numbers=numbers,
         norm=norm,
-        own_lower=own_lower,
-        own_shares=own_shares,
-        pull=ca.fabs(products),
-        coupling=_coupling(law, products),
-        lightness=lightness,
-        heaviest=ca.norm_fro(norm.lower),
+        left_out=None if law is LAWS["tensor"] else _left_out(law, numbers, norm, spin),
+        own_share=ca.sqrt(largest_eigenvalue(inverse)) if law.gyroscopic_term else ca.SX(0.0),
+        coupling=ca.fmax(_bilinear_norm(law.gyroscopic(numbers)), LEAST_COUPLING),
+        lightness=ca.norm_fro(inverse),
+        heaviest=ca.norm_fro(inertia),
     )
 
 
-def _coupling(law: RotationLaw, products: ca.SX) -> ca.SX:
-    """Returns g with |G(a, b)| <= g |a| |b|, at least LEAST_COUPLING. [EB] eq. (24)."""
-    if not law.products:
-        return ca.SX(LEAST_COUPLING)
-    per = ca.vertcat(*(1.0 if i == j else 0.5 for i, j in law.products))
-    square = ca.sum1(ca.sum2(products**2 @ ca.diag(per)))
-    return ca.fmax(ca.sqrt(square), LEAST_COUPLING)
+def _left_out(law: RotationLaw, numbers: ca.SX, norm: EnergyNorm, spin: ca.SX | None) -> LeftOut:
+    """Returns what a law leaves out: delta = J w' - M + w x (J w + h) as a function of M and w."""
+    J, still = norm.inertia, ca.SX.zeros(3)
+    axes = ca.horzsplit(ca.SX.eye(3))
+    unbalanced = J @ ca.horzcat(*(law.acceleration(numbers, still, axis) for axis in axes)) - ca.SX.eye(3)
+    own = law.gyroscopic(numbers)
+    own = ca.horzcat(own, ca.SX.zeros(3, 6 - own.size2()))
+    by_rates = ca.densify(norm.inverse @ (J @ own - gyroscopic_torque(J)))
+    by_rate = None
+    if spin is not None:
+        acting = ca.skew(spin)  # -w x h: the torque that moving parts add
+        by_rate = ca.densify(norm.inverse @ (unbalanced if law.gyroscopic_term else -ca.SX.eye(3)) @ acting)
+    return LeftOut(ca.densify(norm.inverse @ unbalanced), by_rate, by_rates, _bilinear_norm(by_rates))
 
 
-LOWER_TRIANGLE = tuple((i, j) for j in range(3) for i in range(j, 3))
+def _bilinear_norm(products: ca.SX) -> ca.SX:
+    """Returns g with |G(a, b)| <= g |a| |b| of a map of MIXED_PRODUCTS and SQUARES, (3, n). [EB] eq. (23)."""
+    columns = ca.horzsplit(products) if products.numel() else []
+    mixed, squares = columns[:3], columns[3:]
+    square = sum((0.5 * ca.sumsqr(column) for column in mixed), ca.SX(0.0))
+    return ca.sqrt(sum((ca.sumsqr(column) for column in squares), square))
 
 
 def stored(constants: BoundConstants) -> ca.SX:
-    """Returns what the bound needs of a composite as a vector, (n,), without what is zero in every one."""
-    norm = constants.norm
-    upper = (*norm.turned, norm.in_box)
-    return ca.vertcat(
-        *(_elements(matrix, LOWER_TRIANGLE) for matrix in (norm.lower, norm.inverse, constants.own_lower)),
-        *(_elements(matrix, UPPER_TRIANGLE) for matrix in upper),
-        constants.pull.nz[:],
-        constants.own_shares,
-        norm.rate_share,
-        constants.coupling,
-        constants.lightness,
-        constants.heaviest,
-    )
+    """Returns what steps read of the constants as a vector, (n,); `restored` makes constants of it again."""
+    norm, left_out = constants.norm, constants.left_out
+    if left_out is None:
+        parts = [_elements(norm.squares, UPPER_TRIANGLE)]
+    else:
+        by_rate = [] if left_out.by_rate is None else [ca.vec(left_out.by_rate)]
+        parts = [ca.vec(left_out.by_torque), *by_rate, ca.vec(left_out.by_rates), left_out.bend]
+        parts += [_elements(S, UPPER_TRIANGLE) for S in norm.turned]
+    scalars = (norm.rate_share, norm.steepest)
+    own = (constants.own_share, constants.coupling, constants.lightness, constants.heaviest)
+    return ca.vertcat(*parts, *scalars, *own)
 
 
 def _elements(matrix: ca.SX, places: Sequence[tuple[int, int]]) -> ca.SX:
-    return ca.vertcat(*(matrix[i, j] for i, j in places)) if matrix.numel() else ca.SX(0, 1)
+    return ca.vertcat(*(matrix[i, j] for i, j in places))
 
 
 def restored(constants: BoundConstants, vector: ca.SX) -> BoundConstants:
-    """Returns constants of the same form whose elements are those of a vector that `stored` made.
+    """Returns constants of the same form, with what steps read taken from a vector that `stored` made.
 
     What is a number in every composite stays one.
     """
-    known = stored(constants)
-    elements = iter(own if own.is_constant() else vector[i] for i, own in enumerate(ca.vertsplit(known)))
-    norm = constants.norm
-    lower, inverse, own_lower = (
-        _lower(elements) if matrix.numel() else matrix
-        for matrix in (norm.lower, norm.inverse, constants.own_lower)
-    )
-    x, y, z, in_box = (from_upper_triangle(_next(elements, 6)) for _ in range(4))
-    pull = ca.SX(constants.pull.sparsity(), _next(elements, constants.pull.nnz()))
-    shares = _next(elements, constants.own_shares.numel())
-    rate_share, coupling, lightness, heaviest = (next(elements) for _ in range(4))
+    known = enumerate(ca.vertsplit(stored(constants)))
+    elements = iter([own if own.is_constant() else vector[i] for i, own in known])
+    norm, left_out = constants.norm, constants.left_out
+    if left_out is None:
+        norm = replace(norm, squares=_symmetric(elements))
+    else:
+        by_torque = _matrix(elements, 3)
+        by_rate = None if left_out.by_rate is None else _matrix(elements, 3)
+        left_out = LeftOut(by_torque, by_rate, _matrix(elements, 6), next(elements))
+        norm = replace(norm, turned=(_symmetric(elements), _symmetric(elements), _symmetric(elements)))
+    norm = replace(norm, rate_share=next(elements), steepest=next(elements))
+    own_share, coupling, lightness, heaviest = elements
     return replace(
         constants,
-        norm=replace(
-            norm, lower=lower, inverse=inverse, rate_share=rate_share, turned=(x, y, z), in_box=in_box
-        ),
-        own_lower=own_lower,
-        own_shares=shares,
-        pull=pull,
+        norm=norm,
+        left_out=left_out,
+        own_share=own_share,
         coupling=coupling,
         lightness=lightness,
         heaviest=heaviest,
     )
 
 
-def _next(elements: Iterator[ca.SX], count: int) -> ca.SX:
-    return ca.vertcat(ca.SX(0, 1), *(next(elements) for _ in range(count)))
+def _symmetric(elements: Iterator[ca.SX]) -> ca.SX:
+    return from_upper_triangle(ca.vertcat(*(next(elements) for _ in UPPER_TRIANGLE)))
 
 
-def _lower(elements: Iterator[ca.SX]) -> ca.SX:
-    matrix = ca.SX.zeros(3, 3)
-    for i, j in LOWER_TRIANGLE:
-        matrix[i, j] = next(elements)
-    return matrix
+def _matrix(elements: Iterator[ca.SX], columns: int) -> ca.SX:
+    """Returns a matrix of three rows, its columns one after the other."""
+    return ca.horzcat(*(ca.vertcat(*(next(elements) for _ in range(3))) for _ in range(columns)))

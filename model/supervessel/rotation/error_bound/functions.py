@@ -14,7 +14,7 @@ from supervessel.composite.inertia import from_upper_triangle
 from supervessel.composite.parts import CompositeGraph
 from supervessel.composite.resolved import ResolvedScene
 from supervessel.rotation.axes import AxesGraph
-from supervessel.rotation.dynamics import dynamics_of
+from supervessel.rotation.dynamics import Dynamics, dynamics_of
 from supervessel.rotation.error_bound.carried import (
     INFLATION,
     MotionBounds,
@@ -26,15 +26,15 @@ from supervessel.rotation.error_bound.carried import (
     largest_residual,
     motion_bounds,
 )
-from supervessel.rotation.error_bound.constants import BoundConstants, bound_constants, restored
+from supervessel.rotation.error_bound.constants import BoundConstants, constants_of, restored
 from supervessel.rotation.error_bound.remainder import (
     UNKNOWN,
     Remainder,
+    has_sure_remainder,
     remainder_of,
     remainder_of_taylor,
     step_error,
 )
-from supervessel.rotation.laws import LAWS
 from supervessel.rotation.propagators import PROPAGATORS, Plan
 from supervessel.rotation.propagators.method import Propagator
 from supervessel.scene.schema import Scene
@@ -50,9 +50,8 @@ def bound_after_step(
     step  : [s]
     """
     norm, motion = constants.norm, motion_bounds(constants, body, state[4:], step)
-    exact = constants.law is LAWS["tensor"]
-    residual = ca.SX(0.0) if exact else largest_residual(norm, body, motion)
-    return carried(bound, norm.rate_share, largest_growth(norm, motion), residual, step), motion
+    growth, residual = largest_growth(constants, motion), largest_residual(constants, body, motion)
+    return carried(bound, norm.rate_share, growth, residual, step), motion
 
 
 def bound_functions(
@@ -73,12 +72,11 @@ def bound_functions(
     d, a, s, b = (ca.SX.sym(*size) for size in (("d", c.numel()), ("a", axes.a.numel()), ("s", 4), ("b", 3)))
     before, after = graph.parts(c), graph.parts(d)
     dynamics = dynamics_of(resolved, before, u)
-    constants = restored(
-        bound_constants(dynamics.law, dynamics.numbers, dynamics.inertia), a[axes.slices["bound"]]
-    )
-    body = TurnedBody(dynamics.inertia, dynamics.torque, spin_of(before))
+    constants = restored(constants_of(dynamics), a[axes.slices["bound"]])
+    body = body_of(dynamics)
     end, motion = bound_after_step(constants, body, x, s[0], b[:2])
-    end += _step_error(plan, constants, body, motion, s)
+    sure = has_sure_remainder(resolved.scene.rotation)
+    end += _step_error(plan, constants, body, motion, s if not sure else s[:2])
     rate = INFLATION * constants.norm.rate_share * end[1]
     energy, omega, turned = b[1], ca.SX.sym("omega", 3), ca.SX.sym("turned", 3)
     tensor, other = dynamics.inertia, from_upper_triangle(after["inertia"])
@@ -92,6 +90,12 @@ def bound_functions(
             [kept_momentum(energy, tensor, other, excess)],
         ),
     )
+
+
+def body_of(dynamics: Dynamics) -> TurnedBody:
+    """Returns what turns the body, whatever the law makes of it."""
+    spin = ca.SX.zeros(3) if dynamics.moving is None else dynamics.moving
+    return TurnedBody(dynamics.inertia, dynamics.torque, spin)
 
 
 def spin_of(parts: Mapping[str, ca.SX]) -> ca.SX:
@@ -108,11 +112,16 @@ def keeps_in_truth(scene: Scene) -> dict[str, str]:
 def _step_error(
     plan: Plan, constants: BoundConstants, body: TurnedBody, motion: MotionBounds, s: ca.SX
 ) -> ca.SX:
-    """Returns what a sub-step of a scene's plan adds, (2,) [rad, J^(1/2)]; s[1] is 0 for free motion."""
+    """Returns what a sub-step of a scene's plan adds, (2,) [rad, J^(1/2)].
+
+    s : see the module; s[1] is 0 for free motion, and the estimates are left out where none are asked for
+    """
     free = step_error(None, constants, body, motion)
     if plan.method is None:
         return free
-    stepped = step_error(_remainder(plan.method, s[1]), constants, body, motion, s[2:])
+    stepped = step_error(
+        _remainder(plan.method, s[1]), constants, body, motion, s[2:] if s.numel() > 2 else None
+    )
     return ca.if_else(s[1] == 0.0, free, stepped) if plan.free == "while free" else stepped
 
 

@@ -14,13 +14,21 @@ from typing import Any
 
 import casadi as ca
 
-from supervessel.rotation.error_bound.carried import MotionBounds, TurnedBody, by_spin
+from supervessel.rotation.error_bound.carried import MotionBounds, TurnedBody
 from supervessel.rotation.error_bound.constants import BoundConstants
 from supervessel.rotation.propagators import dop853
 from supervessel.scene.numbers import EPSILON
+from supervessel.scene.schema import Rotation
 
 DEPTH = 512
 """Roundings that follow on each other in one step, at most (counted in tests/model/test_error_bound.py)."""
+
+SURE_ANGLE = 0.05
+"""Angle a of a sub-step of rk4 [rad] up to which a rigid body's z stays below 1/4.
+
+Its size h keeps (h |w|)^2 + 2 a h^2 |c| <= a^2, `propagators.bound`, and g^2 <= 3/2 as each (J_j - J_k)/J_i
+is at most 1: so z <= sqrt(1.5 a^2 + 1.23 a/2), which is 0.19.
+"""
 
 Weights = Mapping[int, float]
 Series = list[Decimal]
@@ -48,6 +56,11 @@ class Remainder:
 
 UNKNOWN = Remainder(1, -1.0, 0.0, 0.0)
 """Of a method whose steps have no bound."""
+
+
+def has_sure_remainder(rotation: Rotation) -> bool:
+    """Whether a method's steps are always short enough for their remainder: no estimate is asked for then."""
+    return rotation.propagator == "rk4" and rotation.max_angle_step <= SURE_ANGLE
 
 
 @cache
@@ -133,24 +146,20 @@ def step_error(
                 long for the bound; None: infinite there
     [EB] eqs. (24), (27), (28).
     """
-    h, law, numbers = motion.step, constants.law, constants.numbers
     rounding, quaternion = _rounding(constants, body, motion)
-    energy = constants.heaviest * rounding
+    root = ca.sqrt(constants.heaviest)  # at least the norm of L
+    energy = root * rounding
     if remainder is None:
         return ca.vertcat(pi * quaternion, energy)
-    coupling = constants.coupling
-    push = ca.norm_2(law.acceleration(numbers, ca.SX.zeros(3), body.torque))
-    spin = ca.norm_fro(by_spin(law, numbers, body.spin))
-    v = ca.norm_2(motion.start) + ca.fmax(ca.sqrt(push / coupling), 0.5 * spin / coupling)
-    z = coupling * v * h
-    known = z <= remainder.limit
-    power = ca.if_else(known, _power(z, remainder.power), ca.inf if estimate is None else 0.0)
-    if law.gyroscopic_term:
-        energy += constants.heaviest * (remainder.rate * v * power)
+    known = motion.share <= remainder.limit
+    power = _power(motion.share, remainder.power)
+    power = ca.if_else(known, power, ca.inf if estimate is None else 0.0)
+    if constants.law.gyroscopic_term:
+        energy += root * (remainder.rate * motion.scale * power)
     angle = pi * (quaternion + remainder.turn * power)
     if estimate is not None:
         angle += ca.if_else(known, 0.0, estimate[0])
-        energy += ca.if_else(known, 0.0, constants.heaviest * estimate[1])
+        energy += ca.if_else(known, 0.0, root * estimate[1])
     return ca.vertcat(angle, energy)
 
 
@@ -166,9 +175,9 @@ def _power(z: ca.SX, exponent: int | ca.SX) -> ca.SX:
 
 def _rounding(constants: BoundConstants, body: TurnedBody, motion: MotionBounds) -> tuple[ca.SX, ca.SX]:
     """Returns what rounding of a step leaves, rate [rad/s] and quaternion. [EB] eq. (28)."""
-    u, h, speed = 0.5 * EPSILON, motion.step, ca.norm_2(motion.reach)
+    u, h, reach = 0.5 * EPSILON, motion.step, motion.reach
     force = ca.norm_2(body.torque)
     if constants.law.gyroscopic_term:
-        force += speed * (ca.norm_fro(body.inertia) * speed + ca.norm_2(body.spin))
-    rate = u * (4.0 * speed + (DEPTH * h) * (constants.lightness * force))
-    return rate, u * (8.0 + (DEPTH * h) * speed) + 0.5 * h * rate
+        force += reach * (constants.heaviest * reach + ca.norm_2(body.spin))
+    rate = u * (4.0 * reach + (DEPTH * h) * (constants.lightness * force))
+    return rate, u * (8.0 + (DEPTH * h) * reach) + 0.5 * h * rate
