@@ -182,6 +182,12 @@ static void tell(Instance *instance) {
 #endif
 }
 
+static double size_of(const double numbers[], size_t count) {
+    double size = 0.0;
+    for (size_t i = 0; i < count; i++) size += fabs(numbers[i]);
+    return size;
+}
+
 void bound_over_sub_step(Instance *instance, const double x[], double size, const Progress *progress) {
     Dynamics *now = &instance->now;
     if (!has_inertia(now->c)) lose(instance);
@@ -192,14 +198,14 @@ void bound_over_sub_step(Instance *instance, const double x[], double size, cons
     composite_refresh_axes(instance);
     const double s[4] = {size, progress->was_free ? 0.0 : progress->exponent, progress->found[0], progress->found[1]};
     double after[3];
-    const bool tame = now->composite_is_tame && are_within(x, STATE_COUNT, TAME) && are_within(s, 4, TAME) && are_within(now->bound, 3, TAME) &&
-                      are_within(&now->values[REFERENCE_TORQUE], INPUT_U_COUNT, TAME);
+    const double sizes = size_of(x + 4, 3) + size_of(s, 4) + size_of(now->bound, 3) +
+                         size_of(&now->values[REFERENCE_TORQUE], INPUT_U_COUNT);
     instance_set_arguments(instance);
     instance->arg[0] = x;
     instance->arg[4] = s;
     instance->arg[5] = now->bound;
     instance->res[0] = after;
-    instance_call(instance, bound_step, tame);
+    instance_call(instance, bound_step, now->composite_is_tame && sizes <= TAME);
     if (after[ANGLE] < PI && after[ENERGY] <= DBL_MAX && after[RATE] <= DBL_MAX) {
         memcpy(now->bound, after, sizeof after);
         now->errors[BOUND] = after[ANGLE];

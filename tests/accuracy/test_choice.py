@@ -308,3 +308,26 @@ def test_the_command_says_in_a_line_what_it_has_chosen(tmp_path, capsys, monkeyp
     out, error = capsys.readouterr()
     assert (out, error[:46]) == ("", "spin.toml: accuracy.attitude = 1e-15 rad: two ")
     assert [path.name for path in tmp_path.iterdir()] == ["spin.toml"]
+
+
+def test_what_is_not_proven_is_watched_unless_the_scene_says_otherwise(tmp_path):
+    """The output decides nothing: the same choice, with it or without; and a proven one has none."""
+    demanding = variant(DOCKED, {"accuracy.attitude": 1e-9})
+    chosen, evidence = choose(parse_scene(demanding))
+    assert evidence["grade"]["name"] != "proven"
+    assert (chosen.outputs.names[-1], evidence["watched"]) == ("error_bound", True)
+    assert choose(chosen) == (chosen, evidence)
+    listed = parse_scene(
+        variant(demanding, {"outputs.names": ["error_bound", "attitude", "angular_velocity"]})
+    )
+    assert choose(listed)[0].outputs.names == listed.outputs.names
+    assert choose(listed)[0].rotation == chosen.rotation
+    unwatched, other = choose(parse_scene(variant(demanding, {"accuracy.error_bound": False})))
+    assert (unwatched.outputs.names, other) == (
+        ("angular_velocity", "attitude"),
+        evidence | {"watched": False},
+    )
+    assert unwatched.rotation == chosen.rotation
+    spinning, proven = choose(parse_scene(SPIN))
+    assert (proven["grade"]["name"], proven["watched"]) == ("proven", False)
+    assert "error_bound" not in spinning.outputs.names

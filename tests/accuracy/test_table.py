@@ -36,7 +36,7 @@ def problems(changes):
 
 def test_the_table_is_read_and_leaves_the_law_open():
     scene = parse_scene(SCENE)
-    assert scene.accuracy.model_dump() == ACCURACY
+    assert scene.accuracy.model_dump() == ACCURACY | {"error_bound": True}
     assert not scene.is_chosen
     assert parse_scene(variant(SCENE, {"accuracy.rate": None})).accuracy.rate is None
     kept = {"rotation": {"mass_change": "momentum", "attitude": [1, 1, 0, 0]}}
@@ -55,6 +55,7 @@ def test_the_table_is_read_and_leaves_the_law_open():
             {"accuracy.attitude": 2.0},
             "accuracy.attitude = 2.0 rad: must be a number from 1e-15, what doubles tell, to 1",
         ),
+        ({"accuracy.error_bound": 1}, "accuracy.error_bound = 1: must be true or false"),
         ({"accuracy.rate": 0.0}, "accuracy.rate = 0.0 rad/s: must be a finite number > 0"),
         (
             {"accuracy.rate": 1e-20},

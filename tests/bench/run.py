@@ -22,6 +22,8 @@ from supervessel.scene.schema import Scene
 HERE = Path(__file__).parent
 SCENE = HERE.parent.parent / "examples" / "iss_dg.toml"
 STEPS = 2000
+LAWS = ("none", "decoupled", "principal", "tensor")
+SHOWN = ("mass", "attitude")
 MEANINGS = {
     "set+step+get": "set inputs, step, get outputs",
     "set+step+get,changing": "the same, values changing",
@@ -89,6 +91,27 @@ def main() -> None:
             for case, (nanoseconds, ratio) in times(host, library, description, some, got).items():
                 what = MEANINGS.get(case, "a plain RK4 step")
                 print(f"| {len(some)}, {len(got)} | {what} | {nanoseconds} | {ratio} |")
+        print("\n| law | step alone, plain RK4 steps | with the output error_bound |\n|---|---:|---:|")
+        for law in LAWS:
+            ratios = [
+                step_alone(host, with_law(law, names), folder) for names in (SHOWN, (*SHOWN, "error_bound"))
+            ]
+            print(f"| `{law}` | {' | '.join(ratios)} |")
+
+
+def with_law(law: str, names: tuple[str, ...]) -> Scene:
+    """Returns the scene with a law and these outputs, turning about all axes."""
+    scene = by_rk4(load_scene(SCENE))
+    rotation = scene.rotation.model_copy(update={"law": law, "angular_velocity": (0.01, -0.02, 0.03)})
+    outputs = scene.outputs.model_copy(update={"names": names})
+    name = f"{law}_{len(names)}"
+    return scene.model_copy(update={"name": name, "rotation": rotation, "outputs": outputs})
+
+
+def step_alone(host: Path, scene: Scene, folder: Path) -> str:
+    """Returns what a step takes in which nothing is set and got, in plain RK4 steps, as printed."""
+    library, description = unpack(scene, folder)
+    return times(host, library, description, [], [])["step"][1]
 
 
 if __name__ == "__main__":

@@ -211,7 +211,7 @@ class Accuracy(Table):
     rate: RateError | None = None
     horizon: Seconds
     step: Seconds
-    error_bound: bool = True
+    error_bound: Flag = True
 
 
 class Outputs(Table):
