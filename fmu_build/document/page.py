@@ -11,6 +11,7 @@ from string import Template
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fmu_build.document.accuracy_text import accuracy_text
 from fmu_build.document.rotation_text import energy_and_momentum, law_equation, law_text, what_changes_keep
@@ -18,8 +19,8 @@ from fmu_build.document.tables import Cell, number_text, rounded, table
 from fmu_build.interface.variable_table import Role, TableEntry
 from fmu_build.versions import VERSIONS
 from supervessel.composite.docks import joints, switchable
+from supervessel.composite.start import principal_moments
 from supervessel.drawing.geometry import Assembly
-from supervessel.reference import Composite
 from supervessel.rotation.propagators import description
 from supervessel.scene.schema import Scene, Vessel
 
@@ -163,17 +164,19 @@ def _points(scene: Scene) -> str:
     return table(caption, ("point", "position [m]"), rows) if rows else ""
 
 
-def _composite(whole: Composite) -> str:
-    """Returns the table of mass, barycentre and moments of the composite at the start."""
-    J = whole.inertia
+def _composite(whole: Mapping[str, NDArray[np.float64]]) -> str:
+    """Returns the table of mass, barycentre and moments of the composite at the start.
+
+    whole : parts of c by name, see `composite.parts.COMPOSITE_SIZES`
+    """
     rows: list[tuple[Cell, ...]] = [
-        ("mass [kg]", rounded([whole.mass])),
-        ("barycentre [m]", rounded(whole.barycentre)),
-        ("pmi [m2]", rounded(whole.pmi)),
-        ("inertia xx, yy, zz, xy, xz, yz [kg.m2]", rounded(J[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])),
+        ("mass [kg]", rounded(whole["mass"])),
+        ("barycentre [m]", rounded(whole["barycentre"])),
+        ("pmi [m2]", rounded(whole["pmi"])),
+        ("inertia xx, yy, zz, xy, xz, yz [kg.m2]", rounded(whole["inertia"])),
     ]
-    if np.all(np.isfinite(J)):
-        rows.append(("principal moments [kg.m2]", rounded(np.linalg.eigvalsh(J))))
+    if np.all(np.isfinite(whole["inertia"])):
+        rows.append(("principal moments [kg.m2]", rounded(principal_moments(whole["inertia"]))))
     return table("The whole at start values", (), rows)
 
 

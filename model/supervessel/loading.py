@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from supervessel.composite.docks import TooManyWaysError
 from supervessel.composite.resolved import resolve
-from supervessel.composite.start import composite_at_start
+from supervessel.composite.start import composite_at_start, principal_moments
 from supervessel.problems import SceneError, few_suggestions, key_path, quantity, unknown
 from supervessel.scene.consistency import consistency_problems
 from supervessel.scene.names import misnamed_courses, naming_problems, size_problems
@@ -146,8 +146,6 @@ def _composite_problems(scene: Scene) -> list[str]:
     law = scene.rotation.law
     if law == "none" or (np.all(c["margins"] > 0.0) and np.all(np.isfinite(c["law"]))):
         return []
-    xx, yy, zz, xy, xz, yz = c["inertia"]
-    moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    three = ", ".join(f"{moment:.10g}" for moment in moments)
+    three = ", ".join(f"{moment:.10g}" for moment in principal_moments(c["inertia"]))
     allowed = f'must be positive beyond rounding for rotation.law = "{law}"'
     return [f"vessels: the composite has principal moments {three} kg m2: {allowed}"]

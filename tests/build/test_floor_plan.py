@@ -29,6 +29,9 @@ MODEL, BUILD = Path(supervessel.__path__[0]), Path(fmu_build.__path__[0])
 DOOR = MODEL / "fmu.py"
 """The one module of supervessel that knows fmu_build."""
 
+WITNESS = MODEL / "reference"
+"""The model in numpy, an independent witness: for tests and users, off the path on which FMUs are made."""
+
 WITH_BOTH = variant(
     body(),
     {
@@ -41,14 +44,14 @@ WITH_BOTH = variant(
 
 
 def imported(path: Path) -> set[str]:
-    """Returns the names of the modules that a module imports, inside functions too."""
+    """Returns the names of what a module imports, inside functions too: modules, and names from them."""
     names = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}: relative import"
-            names.add(node.module or "")
+            names |= {node.module or "", *(f"{node.module}.{alias.name}" for alias in node.names)}
     return names
 
 
@@ -56,6 +59,15 @@ def imported(path: Path) -> set[str]:
 def test_only_the_door_knows_fmu_build(path):
     known = {name for name in imported(path) if name.partition(".")[0] == "fmu_build"}
     assert path == DOOR or not known
+
+
+ALL = sorted(path for package in (MODEL, BUILD) for path in package.rglob("*.py"))
+
+
+@pytest.mark.parametrize("path", ALL, ids=lambda path: f"{path.parent.name}-{path.stem}")
+def test_only_the_public_names_know_the_witness(path):
+    known = {name for name in imported(path) if f"{name}.".startswith("supervessel.reference.")}
+    assert WITNESS in path.parents or path == MODEL / "__init__.py" or not known
 
 
 def test_the_model_holds_no_c():

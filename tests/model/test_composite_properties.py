@@ -15,6 +15,7 @@ import pytest
 from hypothesis import Phase, assume, given, settings
 
 from supervessel import Twin, reference
+from supervessel.composite.start import poses_at_start
 from support import (
     DISCARD,
     ISS_DG,
@@ -44,6 +45,8 @@ RUN = settings(deadline=None, derandomize=True, max_examples=30, phases=(Phase.e
 INERTIA_ULPS = 430
 # Sums of five masses, or of thirty sixths.
 MASS_ULPS = 36
+# Of a place over `distance`, and of a rotation, as derived above.
+POSE_ULPS = 100
 # Each turning of a tensor or a place by a drawn rotation, in the test itself, is a sum of 9 products.
 TURNING_ULPS = 32
 
@@ -303,6 +306,18 @@ def test_points_and_twin_give_the_parallel_axis_tensor(engine: str, assembly: As
 def test_generated_c_gives_the_parallel_axis_tensor(generated_c: GeneratedC, assembly: Assembly) -> None:
     distance = exact(assembly.raw())[1]
     assert_same(generated_c(assembly), parallel_axis(assembly), distance, turning=TURNING_ULPS)
+
+
+@RUN
+@given(assembly=assemblies(), moving=st.booleans())
+def test_vessels_start_where_they_were_placed(assembly: Assembly, moving: bool) -> None:
+    raw = assembly.raw()
+    inputs = {"pose": raw["docks"][0]["ports"]} if moving else {}
+    found, bound = poses_at_start(scene(raw | {"inputs": inputs})), (POSE_ULPS + TURNING_ULPS) * U
+    assert list(found) == list(assembly.vessels)
+    for name, (R_root_vessel, origin) in found.items():
+        assert np.abs(R_root_vessel - assembly.vessels[name].rotation).max() <= bound
+        assert np.abs(origin - assembly.vessels[name].origin).max() <= bound * exact(raw)[1]
 
 
 # Invariances

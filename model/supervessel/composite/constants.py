@@ -17,7 +17,7 @@ from supervessel.composite.docks import Joint, VesselGroup
 from supervessel.composite.inertia import combine_numbers, orbiter_moments, placed_body
 from supervessel.composite.poses import Pose, constant, mated_pose, port_axes, scaled
 from supervessel.scene.inputs import vessel_of
-from supervessel.scene.schema import Scene, Vessel
+from supervessel.scene.schema import Port, Scene, Vessel
 
 Places = Mapping[str, Pose]
 """Poses of vessels, whose origins are their anchors, constants, in the axes of their group."""
@@ -86,6 +86,11 @@ def _specific_inertia(scene: Scene, vessel: Vessel) -> NDArray[np.float64]:
     if scene.convention == "orbiter" and vessel.pmi is not None:
         return np.diag(np.array(ca.evalf(orbiter_moments(constant(vessel.pmi))))[:, 0])
     return np.array(vessel.specific_inertia)
+
+
+def port_frame(port: Port) -> NDArray[np.float64]:
+    """Returns R_vessel_port, (3, 3), of a port as the scene has it, see `poses.port_axes`."""
+    return np.array(ca.evalf(port_axes(constant(scaled(port.direction)), constant(scaled(port.alignment)))))
 
 
 def _mated_poses(scene: Scene, joints: Sequence[Joint]) -> list[Pose]:

@@ -1,14 +1,19 @@
-"""The composite for a scene's own values of the inputs: what the FMU starts with."""
+"""What the FMU starts with, the scene's own values of the inputs: the composite, and where vessels stand."""
 
+from collections.abc import Sequence
 from math import frexp, ldexp
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from supervessel.composite.anchors import anchor
+from supervessel.composite.constants import places
+from supervessel.composite.docks import groups, joints
 from supervessel.composite.parts import composite_graph
 from supervessel.composite.resolved import resolve
-from supervessel.scene.schema import Scene
+from supervessel.scene.inputs import vessel_of
+from supervessel.scene.schema import Inputs, Scene
 from supervessel.shell.interrupts import interrupt_afterwards
 from supervessel.simplification import simplification
 
@@ -43,3 +48,39 @@ def composite_at_start(scene: Scene) -> dict[str, NDArray[np.float64]]:
     graph = composite_graph(resolve(scene))
     values = np.array(ca.Function("composite", [graph.p], [graph.c])(p_start(scene))).ravel()
     return {name: values[place] for name, place in graph.slices.items()}
+
+
+def principal_moments(elements: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns the eigenvalues, (3,) [kg m2], ascending, of a tensor given by its elements.
+
+    elements : (6,) [kg m2], xx, yy, zz, xy, xz, yz, as in the part "inertia" of c; finite
+    """
+    xx, yy, zz, xy, xz, yz = elements
+    return np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+@interrupt_afterwards()
+@simplification(True)
+def poses_at_start(scene: Scene) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Returns R_root_vessel, (3, 3), and origin, (3,) [m], root axes, of vessels as they stand at the start.
+
+    Of the root, which is the first, and of every vessel that docks closed at the start join to it, in the
+    scene's order. By the equations of the composite, [EQ] The assembly.
+    """
+    still = _attached(scene)
+    (group,) = groups(still)
+    (inside,) = places(still, [group])
+    found = {}
+    for name in (scene.root, *(name for name in still.vessels if name != scene.root)):
+        R_root_vessel, place = (np.array(ca.evalf(x)) for x in (inside[name].rotation, inside[name].origin))
+        origin = anchor(still, scene.root) + place.ravel() - R_root_vessel @ anchor(still, name)
+        found[name] = R_root_vessel, origin
+    return found
+
+
+def _attached(scene: Scene) -> Scene:
+    """Returns the part of a scene that docks closed at the start join to the root, without inputs."""
+    names = {scene.root, *(joint.child for joint in joints(scene))}
+    closed = tuple(dock for dock in scene.docks if dock.docked and vessel_of(dock.ports[0]) in names)
+    vessels = {name: vessel for name, vessel in scene.vessels.items() if name in names}
+    return scene.model_copy(update={"vessels": vessels, "docks": closed, "inputs": Inputs()})

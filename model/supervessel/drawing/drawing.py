@@ -107,7 +107,7 @@ def drawing(parts: Assembly) -> Figure:
         Text((20.0, 28.0), _short(scene.name, 60), size=17.0, colour=DARK),
         Text(
             (20.0, 47.0),
-            f"{vessels}, {parts.whole.mass:.6g} kg; body axes are those of {_short(scene.root)}",
+            f"{vessels}, {parts.whole['mass'][0]:.6g} kg; body axes are those of {_short(scene.root)}",
             colour=GREY,
         ),
         _main_view(parts, main),

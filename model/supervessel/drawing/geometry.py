@@ -7,10 +7,11 @@ from math import fsum, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from supervessel import reference
-from supervessel.composite.docks import joints, switchable
+from supervessel.composite.constants import port_frame
+from supervessel.composite.docks import switchable
+from supervessel.composite.start import composite_at_start, poses_at_start
 from supervessel.scene.inputs import vessel_of
-from supervessel.scene.schema import Inputs, Scene, Vessel
+from supervessel.scene.schema import Scene, Vessel
 
 Array = NDArray[np.float64]
 
@@ -26,7 +27,7 @@ FARTHEST = 1e100
 class DrawnVessel:
     """A vessel as drawn.
 
-    number    : from 1, in the order in which vessels hang on the root
+    number    : from 1, the root's, then in the scene's order
     centre    : (3,) [m], centre of mass, root axes
     axes      : (3, 3), columns are the box's axes, root axes
     semi_axes : (3,) [m], half of the box's edges along those axes
@@ -80,7 +81,7 @@ class Assembly:
     poses           : rotation R_root_vessel, (3, 3), and origin, (3,) [m], of the root, which is the first,
                       and of every vessel that docks closed at the start join to it
     detached        : the other vessels
-    whole           : mass distribution
+    whole           : the composite: parts of c by name, see `composite.parts.COMPOSITE_SIZES`
     barycentre      : (3,) [m], root axes, None where it is too far away to be drawn
     points          : where forces act on `vessels`
     vessels_omitted : vessels with a pose that are not among `vessels`
@@ -90,7 +91,7 @@ class Assembly:
     scene: Scene
     poses: Mapping[str, tuple[Array, Array]]
     detached: Sequence[str]
-    whole: reference.Composite
+    whole: Mapping[str, Array]
     vessels: Sequence[DrawnVessel]
     ports: Sequence[DrawnPort]
     points: Sequence[DrawnPoint]
@@ -102,9 +103,8 @@ class Assembly:
 def assembly(scene: Scene) -> Assembly:
     """Returns a scene placed at its start values, with as many vessels and ports as a drawing can hold."""
     with np.errstate(all="ignore"):  # what overflows is not drawn
-        attached = _attached(scene)
-        poses = reference.poses(attached)
-        whole = reference.composite(attached)
+        poses = poses_at_start(scene)
+        whole = composite_at_start(scene)
         heaviest = sorted(poses, key=lambda name: (name != scene.root, -scene.vessels[name].mass))
         shown = frozenset(heaviest[:VESSEL_LIMIT])
         vessels = [
@@ -123,18 +123,10 @@ def assembly(scene: Scene) -> Assembly:
         vessels=vessels,
         ports=ports[:PORT_LIMIT],
         points=points,
-        barycentre=whole.barycentre if _near(whole.barycentre) else None,
+        barycentre=whole["barycentre"] if _near(whole["barycentre"]) else None,
         vessels_omitted=len(poses) - len(vessels),
         ports_omitted=max(0, len(ports) - PORT_LIMIT),
     )
-
-
-def _attached(scene: Scene) -> Scene:
-    """Returns the part of a scene that docks closed at the start join to the root."""
-    names = {scene.root, *(joint.child for joint in joints(scene))}
-    closed = tuple(dock for dock in scene.docks if dock.docked and vessel_of(dock.ports[0]) in names)
-    vessels = {name: vessel for name, vessel in scene.vessels.items() if name in names}
-    return scene.model_copy(update={"vessels": vessels, "docks": closed, "inputs": Inputs()})
 
 
 def semi_axes(moments: Sequence[float]) -> Array:
@@ -177,7 +169,7 @@ def _ports(scene: Scene, vessel: DrawnVessel, rotation: Array, origin: Array) ->
     switchables = {name for dock in scene.docks if switchable(scene, dock) for name in dock.ports}
     for port_name, port in scene.vessels[vessel.name].ports.items():
         name = f"{vessel.name}.{port_name}"
-        direction, alignment, _ = (rotation @ reference.port_axes(port.direction, port.alignment)).T
+        direction, alignment, _ = (rotation @ port_frame(port)).T
         position = origin + rotation @ np.array(port.position)
         if _near(position):
             yield DrawnPort(name, vessel, position, direction, alignment, name in docked, name in switchables)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from supervessel import reference
+from supervessel.composite.start import poses_at_start
 from supervessel.orbiter.frames import Array, mirrored, quaternion, rotation, turn_angle
 from supervessel.orbiter.scenario import Ship
 from supervessel.orbiter.text import Note, numbers
@@ -54,7 +54,7 @@ def saved_motion(ship: Ship, problems: list[str]) -> Saved:
 def start_of(scene: Scene, parts: Assembled, saved: Mapping[str, Saved]) -> tuple[Start, list[Note]]:
     """Returns the state at the start, of the root or of what is docked to it, and notes."""
     names = identifiers(list(parts.members))
-    placed = reference.poses(scene)
+    placed = poses_at_start(scene)
     poses = {name: placed[names[name]] for name in parts.members}
     root = parts.members[parts.root].ship.place
     attitude, said = (1.0, 0.0, 0.0, 0.0), "no AROT: body axes are the inertial ones"

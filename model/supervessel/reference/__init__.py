@@ -1,7 +1,8 @@
 """The model in numpy, written for reading: a second opinion that shares no code with the symbolic one.
 
 Everything takes and returns plain arrays in SI units; `values` overrides inputs by the names that the FMU
-gives them. The body axes are those of the root vessel.
+gives them. The body axes are those of the root vessel. It is for tests and for users: nothing that makes an
+FMU, a twin or a drawing imports it.
 
 In the examples `scene` is `load_scene("examples/iss_dg.toml")`, with `from supervessel import reference`.
 """
