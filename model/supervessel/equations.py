@@ -16,7 +16,8 @@ Symbols, each a column vector; units and axes are those of the FMU's variables:
 
 c is computed when p changes; a is computed when it is needed and c has changed. An element of c that is
 constant in this scene is a number in the functions of c: they do not read that element of the argument.
-Source of the equations: model/docs/equations.md, cited as [EQ] with the title of a section.
+Source of the equations: model/docs/equations.md, cited as [EQ] with the title of a section and the
+number of an equation.
 """
 
 from collections.abc import Mapping

@@ -2,7 +2,8 @@
 
 Root axes are the axes of the root vessel. A rigid group is a set of vessels that never move relative to each
 other; its axes are those of one of its vessels, see `resolved.RigidGroup`.
-Source of poses and sums: [EQ] The assembly; of motions: [EQ] When masses or poses change.
+Source of poses and sums: [EQ] The assembly, eqs. (4) to (6); of motions: [EQ] When masses or poses
+change, eq. (11).
 """
 
 from collections.abc import Callable, Sequence

@@ -24,7 +24,7 @@ middle  : (3,) [m], barycentre from c_1, root axes
 inertia : (6,) [kg m2], about the barycentre, root axes, of the bodies taken so far
 
 Tensors stand as xx, yy, zz, xy, xz, yz.
-Source: [EQ] The assembly.
+Source: [EQ] The assembly, eqs. (4) to (6).
 """
 
 import casadi as ca

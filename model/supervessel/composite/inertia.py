@@ -1,7 +1,7 @@
 """Mass distribution of rigid bodies and of their sum, in CasADi symbols.
 
 An inertia tensor J is about a centre of mass, with J_xx = integral of y^2 + z^2 and J_xy = MINUS the integral
-of x y over the mass, so that J omega is angular momentum: [EQ] What an inertia is.
+of x y over the mass, so that J omega is angular momentum: [EQ] What an inertia is, eq. (3).
 Constants fold to numbers as expressions are built. The two triangles of a tensor share their symbols.
 """
 
@@ -49,7 +49,7 @@ class Body:
         Where velocity or rate is None, the inner axes are at rest in the outer ones.
         With o, v, w for origin, velocity, rate and c, J of this value: centre o + R c, inertia R J R^T,
         velocity v + w x R c, spin R J R^T w.
-        Source: [EQ] The assembly; When masses or poses change.
+        Source: [EQ] The assembly, eqs. (5), (6); When masses or poses change, eq. (11).
         """
         arm, inertia = R_outer_inner @ self.centre, congruence(R_outer_inner, self.inertia)
         if velocity is None or rate is None:
@@ -72,7 +72,7 @@ def placed_body(
     centre           : (3,) [m], the vessel's centre of mass, vessel axes
     R_outer_vessel   : (3, 3)
     origin           : (3,) [m], of the vessel axes, outer axes
-    Source: [EQ] The assembly.
+    Source: [EQ] The assembly, eqs. (5), (6).
     """
     specific = congruence(R_outer_vessel, specific_inertia)
     return Body(mass, origin + R_outer_vessel @ centre, mass * specific)
@@ -119,7 +119,8 @@ def combine(bodies: Sequence[Body]) -> Body:
     h = sum h_j + m_j rho_j x rho_j', with c_j, J_j, h_j the centre, inertia and spin of body j.
     Each centre is taken from the first body's before anything is multiplied: a far origin costs no digits but
     those that the differences of the centres lose, and an error of c enters J by its square.
-    Source: [CV] eqs. (10), (11) with products of inertia: [EQ] The assembly; When masses or poses change.
+    Source: [CV] eqs. (10), (11) with products of inertia: [EQ] The assembly, eqs. (5), (6); When
+    masses or poses change, eq. (11).
     """
     first, *others = bodies
     if not others:

@@ -71,7 +71,7 @@ def mated_pose(parent: tuple[ca.SX, ca.SX], child: tuple[ca.SX, ca.SX]) -> Pose:
 
     parent, child : position (3,) [m] and R_vessel_port, (3, 3), of each mated port, its own vessel's axes
     R is R_parent_child: R d_child = -d_parent, R a_child = a_parent; both ports are at one point.
-    Source: [CV] eqs. (8), (9); [EQ] The assembly.
+    Source: [CV] eqs. (8), (9); [EQ] The assembly, eq. (4).
     """
     (position_parent, axes_parent), (position_child, axes_child) = parent, child
     facing = ca.horzcat(-axes_parent[:, 0], axes_parent[:, 1], -axes_parent[:, 2])

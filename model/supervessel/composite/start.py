@@ -65,7 +65,7 @@ def poses_at_start(scene: Scene) -> dict[str, tuple[NDArray[np.float64], NDArray
     """Returns R_root_vessel, (3, 3), and origin, (3,) [m], root axes, of vessels as they stand at the start.
 
     Of the root, which is the first, and of every vessel that docks closed at the start join to it, in the
-    scene's order. By the equations of the composite, [EQ] The assembly.
+    scene's order. Source: [EQ] The assembly, eq. (4).
     """
     still = _attached(scene)
     (group,) = groups(still)

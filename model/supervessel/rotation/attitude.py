@@ -1,7 +1,7 @@
 """Attitude quaternions in CasADi symbols: unit, scalar first, Hamilton product, body to inertial axes.
 
 q = (w, v) = (w, x, y, z) takes body components of a vector to inertial ones: (0, v_inertial) =
-q (0, v_body) q*, with q* = (w, -v). Source of all that follows from this: [EQ] Conventions.
+q (0, v_body) q*, with q* = (w, -v). Source of all that follows from this: [EQ] Conventions, eq. (1).
 """
 
 import casadi as ca
@@ -12,7 +12,7 @@ def attitude_dot(attitude: ca.SX, angular_velocity: ca.SX) -> ca.SX:
 
     attitude         : q_inertial_body, (4,), of any length
     angular_velocity : omega, of the body relative to inertial axes, (3,) [rad/s], body axes
-    Source: [EQ] Conventions.
+    Source: [EQ] Conventions, eq. (2).
     """
     w, x, y, z = ca.vertsplit(attitude)
     p, q, r = ca.vertsplit(0.5 * angular_velocity)

@@ -8,8 +8,8 @@ A change happens at one instant and takes the inputs p from their values before 
 4. docks close: what docks brings along its angular momentum about the common barycentre.
 
 All vectors and tensors are about the barycentre in body axes: J [kg m2] and h [N m s] as in [EQ] When masses
-or poses change, which is the source of the equations here. In stages 2 and 3 J is the tensor of the law,
-`RotationLaw.keeping`; in stage 4 it is the full tensor under every law.
+or poses change, eq. (11), which is the source of the equations here. In stages 2 and 3 J is the tensor of the
+law, `RotationLaw.keeping`; in stage 4 it is the full tensor under every law.
 """
 
 from collections.abc import Callable, Mapping

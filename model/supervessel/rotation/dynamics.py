@@ -39,7 +39,8 @@ class Dynamics:
 
         state : q_inertial_body, (4,), and omega, (3,) [rad/s], body axes
         The law is given the torque M - omega x h.
-        Source: [EQ] Conventions; Rotation: the four laws; When masses or poses change.
+        Source: [EQ] Conventions, eq. (2); Rotation: the four laws, eqs. (7) to (10); When masses or poses
+        change, eq. (11).
         """
         attitude, omega = state[:4], state[4:]
         torque = self.torque if self.spin is None else self.torque - ca.cross(omega, self.spin)

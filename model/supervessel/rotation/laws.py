@@ -4,7 +4,7 @@ A law is one entry in LAWS. Its `prepare` turns an inertia tensor into the numbe
 for each change of inertia; its `acceleration` uses them at every stage of a step. Power series need the same
 acceleration as a sum: that by the torque, plus a linear map of products of two rates, which `products` and
 `gyroscopic` give.
-All vectors and tensors are in body axes. Source: [EQ] Rotation: the four laws.
+All vectors and tensors are in body axes. Source: [EQ] Rotation: the four laws, eqs. (7) to (10).
 """
 
 from collections.abc import Callable

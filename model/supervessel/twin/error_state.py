@@ -111,7 +111,8 @@ def error_rate(
     acceleration           : omega', (3,) [rad/s2], body axes
     acceleration_reference : omega_ref', (3,) [rad/s2], axes of the reference
     q_e = q_reference_body = q_ref* q has the rate q_e' = (q_e (0, omega) - (0, omega_ref) q_e)/2, by the rate
-    of an attitude, [EQ] Conventions. The rate of the attitude's error is its derivative by q_e times q_e'.
+    of an attitude, [EQ] Conventions, eq. (2). The rate of the attitude's error is its derivative by q_e times
+    q_e'.
     """
     q = ca.SX.sym("q", 4)
     q_dot = ca.SX.sym("q_dot", 4)
