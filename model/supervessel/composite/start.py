@@ -56,7 +56,7 @@ def principal_moments(elements: Sequence[float] | NDArray[np.float64]) -> NDArra
     elements : (6,) [kg m2], xx, yy, zz, xy, xz, yz, as in the part "inertia" of c; finite
     """
     xx, yy, zz, xy, xz, yz = elements
-    return np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return np.asarray(np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), dtype=float)
 
 
 @interrupt_afterwards()
