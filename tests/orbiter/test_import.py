@@ -1,6 +1,8 @@
 """What an import makes of numbers: masses, axes, attitude, rates, names, and what it says it did not know."""
 
 import re
+import subprocess
+import sys
 import tomllib
 
 import numpy as np
@@ -11,6 +13,8 @@ from hypothesis import strategies as st
 from fmu_build import build_fmu
 from orbiter.files import SCENARIO, line_of
 from supervessel import load_scene, parse_scene, reference
+from support.pages import blocks, text
+from support.processes import ROOT
 
 ROUNDING = 1e-14
 """A quaternion of three turns and the matrix made of it: some 30 operations on numbers below 1."""
@@ -318,3 +322,19 @@ def test_text_of_a_scenario_cannot_break_out_of_a_comment(files):
     hostile = 'GL-01\x7f[vessels.x]"#'
     files.scenario.write_text(SCENARIO.replace("GL-01", hostile), encoding="utf-8")
     assert list(tomllib.loads(files.made().text)["vessels"]) == ["GL_01__vessels_x___", "Station"]
+
+
+def test_the_scenario_of_the_examples_is_two_cylinders_end_to_end(tmp_path):
+    command = next(line for line in "".join(blocks("examples/README.md", "sh")).split("\n") if ".scn" in line)
+    program, *words = command.split()
+    assert program == ".venv/bin/supervessel"
+    words[words.index("-o") + 1] = str(tmp_path / "docked.toml")
+    subprocess.run([sys.executable, "-m", "supervessel", *words], cwd=ROOT, check=True)
+    whole = reference.composite(load_scene(tmp_path / "docked.toml"))
+    masses = np.array([9000.0 + 0.5 * 3000.0, 9000.0 + 3000.0])
+    across = masses.sum() * 6.33 + masses.prod() / masses.sum() * 8.0**2  # centres are 8 m apart
+    assert whole.mass == masses.sum()
+    along = masses.sum() * 2.0
+    assert np.abs(whole.inertia - np.diag([across, across, along])).max() <= ROUNDING * across
+    said = f"{masses.sum():.0f} kg, and moments of {across:.0f} kg m2 across their common axis and {along:.0f} along it"
+    assert said in " ".join(text("examples/README.md").split())
