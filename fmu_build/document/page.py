@@ -115,11 +115,11 @@ def _vessels(parts: Assembly) -> str:
     scene = parts.scene
     hung = {joint.child: joint for joint in joints(scene)}
     rows: list[tuple[Cell, ...]] = []
-    for number, (name, (rotation, origin)) in enumerate(parts.poses.items(), start=1):
+    for number, (name, (R_root_vessel, origin)) in enumerate(parts.poses.items(), start=1):
         vessel = scene.vessels[name]
         on = " to ".join(hung[name].ports) if name in hung else "root"
         with np.errstate(all="ignore"):
-            centre = origin + rotation @ np.array(vessel.centre_of_mass)
+            centre = origin + R_root_vessel @ np.array(vessel.centre_of_mass)
         moments = _moments(vessel)
         rows.append((number, name, vessel.mass, *moments, vessel.centre_of_mass, on, rounded(centre)))
     for name in parts.detached:

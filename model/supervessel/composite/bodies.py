@@ -228,7 +228,7 @@ def _contact_motion(scene: Scene, joint: Joint, lookup: Lookup, pose: Pose) -> t
 
 
 def _port(scene: Scene, name: str, lookup: Lookup) -> tuple[ca.SX, ca.SX]:
-    """Returns position, from its vessel's anchor, and axes of a port in the vessel's axes."""
+    """Returns position, from its vessel's anchor, vessel axes, and R_vessel_port of a port."""
     port = scene.port(name)
     position = lookup(f"{name}.position", from_anchor(scene, vessel_of(name), port.position))
     direction, alignment = (

@@ -70,13 +70,13 @@ def mated_pose(parent: tuple[ca.SX, ca.SX], child: tuple[ca.SX, ca.SX]) -> Pose:
     """Returns the pose of the child vessel in the parent's axes.
 
     parent, child : position (3,) [m] and R_vessel_port, (3, 3), of each mated port, its own vessel's axes
-    R is R_parent_child: R d_child = -d_parent, R a_child = a_parent; both ports are at one point.
+    With R = R_parent_child, R d_child = -d_parent and R a_child = a_parent; both ports are at one point.
     Source: [CV] eqs. (8), (9); [EQ] The assembly, eq. (4).
     """
-    (position_parent, axes_parent), (position_child, axes_child) = parent, child
-    facing = ca.horzcat(-axes_parent[:, 0], axes_parent[:, 1], -axes_parent[:, 2])
-    rotation = facing @ axes_child.T
-    return Pose(rotation, position_parent - rotation @ position_child)
+    (position_parent, R_parent_port), (position_child, R_child_port) = parent, child
+    facing = ca.horzcat(-R_parent_port[:, 0], R_parent_port[:, 1], -R_parent_port[:, 2])
+    R_parent_child = facing @ R_child_port.T
+    return Pose(R_parent_child, position_parent - R_parent_child @ position_child)
 
 
 def scaled(vector: Vector) -> ArrayLike:

@@ -29,7 +29,7 @@ class DrawnVessel:
 
     number    : from 1, the root's, then in the scene's order
     centre    : (3,) [m], centre of mass, root axes
-    axes      : (3, 3), columns are the box's axes, root axes
+    axes      : R_root_box, (3, 3), columns are the box's axes, root axes
     semi_axes : (3,) [m], half of the box's edges along those axes
     massless  : whether the vessel has no mass, so that its moments shape nothing
     """
@@ -78,7 +78,7 @@ class DrawnPoint:
 class Assembly:
     """A scene placed at its start values, and what of it can be drawn.
 
-    poses           : rotation R_root_vessel, (3, 3), and origin, (3,) [m], of the root, which is the first,
+    poses           : R_root_vessel, (3, 3), and origin, (3,) [m], of the root, which is the first,
                       and of every vessel that docks closed at the start join to it
     detached        : the other vessels
     whole           : the composite: parts of c by name, see `composite.parts.COMPOSITE_SIZES`
@@ -146,7 +146,7 @@ def semi_axes(moments: Sequence[float]) -> Array:
 
 
 def equivalent_box(vessel: Vessel) -> tuple[Array, Array]:
-    """Returns axes, (3, 3), as columns in vessel axes, and semi-axes, (3,) [m], of a vessel's box."""
+    """Returns R_vessel_box, (3, 3), and semi-axes, (3,) [m], of a vessel's box."""
     if vessel.pmi is not None:
         return np.eye(3), semi_axes(vessel.pmi)
     tensor = np.array(vessel.specific_inertia)
@@ -156,29 +156,31 @@ def equivalent_box(vessel: Vessel) -> tuple[Array, Array]:
     return axes, semi_axes(np.maximum(moments, 0.0).tolist())
 
 
-def _vessel(scene: Scene, name: str, number: int, rotation: Array, origin: Array) -> DrawnVessel:
+def _vessel(scene: Scene, name: str, number: int, R_root_vessel: Array, origin: Array) -> DrawnVessel:
     vessel = scene.vessels[name]
     axes, semi = equivalent_box(vessel)
-    centre = origin + rotation @ np.array(vessel.centre_of_mass)
-    return DrawnVessel(name, number, centre, rotation @ axes, semi, vessel.mass == 0.0)
+    centre = origin + R_root_vessel @ np.array(vessel.centre_of_mass)
+    return DrawnVessel(name, number, centre, R_root_vessel @ axes, semi, vessel.mass == 0.0)
 
 
-def _ports(scene: Scene, vessel: DrawnVessel, rotation: Array, origin: Array) -> Iterator[DrawnPort]:
+def _ports(scene: Scene, vessel: DrawnVessel, R_root_vessel: Array, origin: Array) -> Iterator[DrawnPort]:
     """Yields the ports of a vessel that are near enough to be drawn."""
     docked = {name for dock in scene.docks if dock.docked for name in dock.ports}
     switchables = {name for dock in scene.docks if switchable(scene, dock) for name in dock.ports}
     for port_name, port in scene.vessels[vessel.name].ports.items():
         name = f"{vessel.name}.{port_name}"
-        direction, alignment, _ = (rotation @ port_frame(port)).T
-        position = origin + rotation @ np.array(port.position)
+        direction, alignment, _ = (R_root_vessel @ port_frame(port)).T
+        position = origin + R_root_vessel @ np.array(port.position)
         if _near(position):
             yield DrawnPort(name, vessel, position, direction, alignment, name in docked, name in switchables)
 
 
-def _force_points(scene: Scene, vessel: DrawnVessel, rotation: Array, origin: Array) -> Iterator[DrawnPoint]:
+def _force_points(
+    scene: Scene, vessel: DrawnVessel, R_root_vessel: Array, origin: Array
+) -> Iterator[DrawnPoint]:
     """Yields the points of a vessel where forces act, if near enough to be drawn."""
     for name in scene.inputs.force:
-        position = origin + rotation @ np.array(scene.point(name).position)
+        position = origin + R_root_vessel @ np.array(scene.point(name).position)
         if vessel_of(name) == vessel.name and _near(position):
             yield DrawnPoint(name, vessel, position)
 

@@ -35,12 +35,12 @@ def rotation(arot: Sequence[float]) -> Array:
     return turned
 
 
-def quaternion(matrix: Array) -> tuple[float, float, float, float]:
-    """Returns the unit quaternion (w, x, y, z), w >= 0, of a rotation matrix, (3, 3).
+def quaternion(R_outer_inner: Array) -> tuple[float, float, float, float]:
+    """Returns the unit quaternion q_outer_inner = (w, x, y, z), w >= 0, of R_outer_inner, (3, 3).
 
     The columns of q q^T times 4, all of which the matrix gives, are multiples of q; the longest is taken.
     """
-    (a, b, c), (d, e, f), (g, h, i) = matrix
+    (a, b, c), (d, e, f), (g, h, i) = R_outer_inner
     products = np.array(
         [
             [1.0 + a + e + i, h - f, c - g, d - b],
@@ -55,7 +55,7 @@ def quaternion(matrix: Array) -> tuple[float, float, float, float]:
     return w, x, y, z
 
 
-def turn_angle(matrix: Array) -> float:
-    """Returns the angle [rad], from 0 to pi, by which a rotation matrix, (3, 3), turns."""
-    w, x, y, z = quaternion(matrix)
+def turn_angle(R_outer_inner: Array) -> float:
+    """Returns the angle [rad], from 0 to pi, between two frames, of R_outer_inner, (3, 3)."""
+    w, x, y, z = quaternion(R_outer_inner)
     return 2.0 * float(np.arctan2(np.linalg.norm([x, y, z]), w))

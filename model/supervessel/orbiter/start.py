@@ -59,10 +59,10 @@ def start_of(scene: Scene, parts: Assembled, saved: Mapping[str, Saved]) -> tupl
     root = parts.members[parts.root].ship.place
     attitude, said = (1.0, 0.0, 0.0, 0.0), "no AROT: body axes are the inertial ones"
     notes: list[Note] = []
-    turned = [(name, R) for name in parts.members if (R := saved[name].attitude) is not None]
+    turned = [(name, own) for name in parts.members if (own := saved[name].attitude) is not None]
     if turned:
-        name, R = turned[0]
-        R_inertial_root = R @ poses[name][0].T
+        name, R_inertial_vessel = turned[0]
+        R_inertial_root = R_inertial_vessel @ poses[name][0].T
         attitude, said = quaternion(R_inertial_root), _origin(parts, name, "AROT")
         notes += list(_stale(parts, saved, poses, name, R_inertial_root))
         if parts.members[name].ship.landed:
@@ -92,12 +92,15 @@ def _stale(
     base: str,
     R_inertial_root: Array,
 ) -> Iterator[Note]:
-    """Yields which ships were saved elsewhere than their docks have them, seen from the one called `base`."""
-    for name, (R, origin) in poses.items():
+    """Yields which ships were saved elsewhere than their docks have them, seen from the one called `base`.
+
+    poses : R_root_vessel, (3, 3), and origin, (3,) [m], root axes, of each ship
+    """
+    for name, (R_root_vessel, origin) in poses.items():
         one, other = saved[base], saved[name]
         if name == base or other.attitude is None:
             continue
-        angle = turn_angle((R_inertial_root @ R).T @ other.attitude)
+        angle = turn_angle((R_inertial_root @ R_root_vessel).T @ other.attitude)
         far = [f"{math.degrees(angle):.2f} degrees"] if angle > 2.0 * ROUNDED_ANGLE else []
         if one.position is not None and other.position is not None:
             offset = origin - poses[base][1]

@@ -37,7 +37,9 @@ class Member:
 
 @dataclass(frozen=True)
 class Start:
-    """The state at the start: attitude (w, x, y, z), angular velocity [rad/s], and where they are from."""
+    """The state at the start: attitude q_inertial_root, (w, x, y, z), angular velocity [rad/s] in root axes,
+    and where they are from.
+    """
 
     attitude: Sequence[float] = (1.0, 0.0, 0.0, 0.0)
     attitude_from: str = ""

@@ -149,15 +149,15 @@ def _order(moments: list[ca.SX], V: _Rows, p: int, q: int) -> None:
 
 
 def _orthonormal(V: ca.SX) -> ca.SX:
-    """Returns V with its dozen roundings removed: one step V (3 E - V^T V)/2 towards the nearest rotation.
+    """Returns V = R_body_principal with its dozen roundings removed: one step towards the nearest rotation.
 
-    V's small elements keep their relative accuracy.
+    The step gives V (3 E - V^T V)/2. V's small elements keep their relative accuracy.
     """
     return V + V @ (0.5 * (ca.SX.eye(3) - V.T @ V))
 
 
 def _least_turned(R: ca.SX) -> ca.SX:
-    """Returns the one of R's four proper frames that `principal` chooses."""
+    """Returns the one of the four proper frames of R = R_body_principal that `principal` chooses."""
     a, b, c = ca.vertsplit(ca.diag(R) + TIE * (4.0 * R[0, :] + 2.0 * R[1, :] + R[2, :]).T)
     none, first, second, third = a + b + c, a - b - c, b - a - c, c - a - b
     others = ca.fmax(second, third)
