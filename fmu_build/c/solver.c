@@ -21,7 +21,8 @@ static double time_slack(const Dynamics *now, double h) {
 
 static Status check_times(Instance *instance, double time, double h) {
     const Dynamics *now = &instance->now;
-    if (!(h > 0.0) || !isfinite(h))
+    /* isfinite(h) beside h > 0.0 would cost twenty instructions more: clang joins them to one test of h's bits */
+    if (!(isgreater(h, 0.0) && islessequal(h, DBL_MAX)))
         return instance_error(instance, "communicationStepSize = %.10g s: must be finite and > 0", h);
     const double slack = time_slack(now, h);
     if (!(fabs(time - now->values[REFERENCE_TIME]) <= time_slack(now, 0.0)))
