@@ -62,6 +62,7 @@ stability: .venv/installed-dev
 
 accuracy: .venv/installed-dev
 	$(BIN)/python -m pytest -m accuracy tests/accuracy
+	PYTHONPATH=tests $(BIN)/python -m accuracy.tightness
 
 surroundings: .venv/installed-dev
 	$(BIN)/python -m pytest -n auto -m surroundings tests
