@@ -64,7 +64,7 @@ def grade_of(scene: Scene, accuracy: Accuracy, choice: Choice) -> Grade:
         beyond = "" if bound.method == "estimate" else f": its remainder leaves {whole:.2g} rad"
         return Grade(LAW_PROVEN, known[0], known[1], known[2], f"method: {choice.propagator}{beyond}", "")
     if not why:
-        why = f"method: its steps are bounded by {whole:.2g} rad over the ranges only"
+        why = bound.why or f"method: its steps are bounded by {whole:.2g} rad over the ranges only"
     return Grade(FLOWN, known[0], known[1], known[2], why, to_narrow(flown, accuracy.horizon, accuracy.step))
 
 

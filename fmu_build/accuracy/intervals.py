@@ -137,6 +137,8 @@ def over_boxes(function: ca.Function, low: Array, high: Array) -> list[Interval]
             elif code == ca.OP_CONST:
                 value = np.full(boxes, function.instruction_constant(k))
                 registers[out[0]] = value, value
+            elif code == ca.OP_MUL and into[0] == into[1]:
+                registers[out[0]] = squared(registers[into[0]])
             elif code in OPERATIONS:
                 registers[out[0]] = OPERATIONS[code](*(registers[i] for i in into))
             else:

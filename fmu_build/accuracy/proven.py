@@ -1,11 +1,12 @@
 """A bound of what a law and its method are off by, proven for all inputs in their ranges, whenever they jump.
 
-The error e of the rate is taken in the energy norm of one fixed tensor K, whatever the true one is at the
-time: a change under which the rate stays does not alter it, so that inputs may jump at every communication
-step.
-Derivation: [EB] eqs. (29) to (34), model/docs/error_bound.md.
+The error, of the rate where every change of inputs keeps the rate, of the momentum where every change keeps
+that, is taken in the energy norm of one fixed tensor K, whatever the true one is at the time. Such a change
+does not alter it, so that inputs may jump at every communication step.
+Derivation: [EB] eqs. (29) to (42), model/docs/error_bound.md.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import ceil, exp, inf, isfinite, pi, sqrt
 
@@ -14,26 +15,33 @@ from numpy.typing import NDArray
 
 from fmu_build.accuracy.range_suprema import (
     MOST_DOCKS,
-    PAIRS,
     SLACK,
+    Bounds,
     RangeSuprema,
-    fastest_change,
     growth_over,
+    off_over,
     range_suprema,
     ranges_of,
+    rates_over,
     residual_over,
 )
-from supervessel.composite.resolved import resolve
+from supervessel.composite.resolved import ResolvedScene, resolve
 from supervessel.rotation.error_bound.constants import LEAST_COUPLING
+from supervessel.rotation.error_bound.functions import keeps_in_truth
 from supervessel.rotation.error_bound.remainder import DEPTH, remainder_of
 from supervessel.rotation.laws import LAWS
+from supervessel.scene.inputs import Change
 from supervessel.scene.numbers import EPSILON
-from supervessel.scene.schema import Scene
+from supervessel.scene.schema import Kept, Scene
 
 Array = NDArray[np.float64]
 
 MOST_POINTS = 1000
 """Communication points at which the bound is given."""
+
+CHANGES, CHANGE_DEPTH = 2, 64
+"""Changes that keep the momentum at one instant, of masses and of poses; and the roundings that follow on
+each other in one, at most (counted in tests/accuracy/test_proven_momentum.py). [EB] eq. (42)."""
 
 SEGMENTS = 24
 """Parts of the flight, over each of which the largest growth and residual count."""
@@ -74,17 +82,11 @@ def proven_bound(scene: Scene, duration: float, step: float) -> ProvenBound:
     count = max(1, ceil(duration / step * (1.0 - 1e-12)))
     points = np.unique(np.rint(np.linspace(1, count, min(count, MOST_POINTS))))
     times: Array = step * points
-    refusal = _refusal(scene)
-    unknown = np.full(len(times), inf)
-    if refusal:
-        return ProvenBound(times, unknown, unknown, unknown, unknown, "remainder", inf, inf, refusal)
     resolved = resolve(scene)
-    found = range_suprema(resolved, ranges_of(resolved))
-    if found is None:
-        why = (
-            "growth: in its ranges the composite is not shown to have an inertia tensor that can be inverted"
-        )
-        return ProvenBound(times, unknown, unknown, unknown, unknown, "remainder", inf, inf, why)
+    found = _known(resolved, ranges_of(resolved))
+    if isinstance(found, str):
+        unknown = np.full(len(times), inf)
+        return ProvenBound(times, unknown, unknown, unknown, unknown, "remainder", inf, inf, found)
     return _flown(scene, found, times, step)
 
 
@@ -97,8 +99,8 @@ def to_narrow(scene: Scene, duration: float, step: float) -> str:
         narrowed = ranges_of(resolved) | {
             v.name: (float(v.start), float(v.start)) for v in resolved.inputs if v.group == group
         }
-        found = range_suprema(resolved, narrowed)
-        if found is None:
+        found = _known(resolved, narrowed)
+        if isinstance(found, str):
             continue
         bound = _flown(scene, found, np.array([duration]), step)
         size = bound.law[-1] if isfinite(bound.law[-1]) else 1e300 * min(bound.growth, 1e6)
@@ -107,34 +109,59 @@ def to_narrow(scene: Scene, duration: float, step: float) -> str:
     return name
 
 
-def _refusal(scene: Scene) -> str:
-    """Returns why a scene's ranges are not looked at; "" where they are."""
-    inputs = scene.inputs
-    rotation = scene.rotation.model_copy(update={"law": "tensor"})
-    kept = scene.model_copy(update={"rotation": rotation}).keeps
-    momentum = [kind for kind, what in kept.items() if what == "momentum"]
-    if inputs.motion:
-        return "growth: inputs.motion: ports that move are not bounded over ranges"
-    if momentum:
-        what = " and ".join(momentum)
-        return f"growth: changes of {what} that keep the momentum are not bounded over ranges"
-    if len(inputs.docked) > MOST_DOCKS:
-        return f"growth: {len(inputs.docked)} docks that open and close: more than {MOST_DOCKS}"
-    for variable in resolve(scene).inputs:
-        if variable.part == "contact" and (variable.low, variable.high) != (0.0, 0.0):
-            return f"growth: {variable.name}: docks that close in motion are not bounded over ranges"
-        if not variable.boolean and (variable.low is None or variable.high is None):
-            return f"growth: {variable.name} has no range"
+def _known(resolved: ResolvedScene, ranges: Bounds) -> RangeSuprema | str:
+    """Returns what the bound needs of ranges, or why they are not looked at."""
+    refusal = _refusal(resolved, ranges)
+    if refusal:
+        return refusal
+    found = range_suprema(resolved, ranges, "momentum" if _changes(resolved, ranges)["momentum"] else "rate")
+    if found is None:
+        return (
+            "growth: in its ranges the composite is not shown to have an inertia tensor that can be inverted"
+        )
+    return found
+
+
+def _changes(resolved: ResolvedScene, ranges: Bounds) -> Mapping[Kept, list[Change]]:
+    """Returns the kinds of change that the ranges allow, by what the true motion keeps at them."""
+    kinds = dict.fromkeys(
+        v.kind.change for v in resolved.shaping if ranges[v.name] != (float(v.start), float(v.start))
+    )
+    kept = keeps_in_truth(resolved.scene)
+    momentum = [kind for kind in kinds if kept.get(kind) == "momentum"]
+    return {"momentum": momentum, "rate": [kind for kind in kinds if kind not in momentum]}
+
+
+def _refusal(resolved: ResolvedScene, ranges: Bounds) -> str:
+    """Returns why ranges are not looked at; "" where they are."""
+    for v in resolved.inputs:
+        if not v.boolean and (v.low is None or v.high is None) and ranges[v.name] != (v.start, v.start):
+            return f"growth: {v.name} has no range"
+    changes = _changes(resolved, ranges)
+    if changes["momentum"] and changes["rate"]:
+        momentum, rate = (" and ".join(changes[kept]) for kept in ("momentum", "rate"))
+        return (
+            f"growth: changes of {momentum} keep the momentum, changes of {rate} the rate: "
+            "in turns they may speed the body up at every step"
+        )
+    docks = sum(v.boolean and ranges[v.name][0] < ranges[v.name][1] for v in resolved.shaping)
+    if docks > MOST_DOCKS:
+        return f"growth: {docks} docks that open and close: more than {MOST_DOCKS}"
+    for v in resolved.contact if docks else ():
+        if ranges[v.name] != (0.0, 0.0):
+            return f"growth: {v.name}: docks that close in motion may speed the body up at every step"
     return ""
 
 
-def _rate_boxes(found: RangeSuprema, start: Array, spans: Array) -> list[tuple[Array, Array]]:
-    """Returns boxes, (3,) and (3,), that hold the cheap rate over each span; infinite where none is found.
+def _boxes(found: RangeSuprema, spans: Array) -> list[tuple[Array, Array]]:
+    """Returns boxes, (3,) and (3,), that hold y, rate or momentum of the law, over each span.
 
-    A box that holds what the rate may reach from the box before, at the fastest change inside it, holds the
-    rate; so does the energy norm's own. [EB] eq. (33).
+    A box that holds what y may reach from the box before, at the fastest change inside it, holds y; so does
+    what its length allows. They are infinite where none is found. [EB] eqs. (33), (35).
     """
-    low, high, energy = start.copy(), start.copy(), float(np.linalg.norm(found.own.T @ start)) * SLACK
+    low, high = found.start
+    middle = float(np.linalg.norm(found.own.T @ (0.5 * (low + high))))
+    energy = (middle + float(np.linalg.norm(np.abs(found.own.T) @ (0.5 * (high - low))))) * SLACK
     shares = np.linalg.norm(np.linalg.inv(found.own), axis=0) * SLACK
     boxes = []
     for span in spans:
@@ -142,7 +169,7 @@ def _rate_boxes(found: RangeSuprema, start: Array, spans: Array) -> list[tuple[A
         cap = energy * shares
         inner, outer = low, high
         for _ in range(60):
-            change = span * fastest_change(found, inner, outer) * SLACK
+            change = span * found.cheap.fastest(np.maximum(np.abs(inner), np.abs(outer))) * SLACK
             wanted = np.maximum(low - change, -cap), np.minimum(high + change, cap)
             if np.all(wanted[0] >= inner) and np.all(wanted[1] <= outer):
                 break
@@ -156,7 +183,7 @@ def _rate_boxes(found: RangeSuprema, start: Array, spans: Array) -> list[tuple[A
 
 
 def _energy_after(found: RangeSuprema, energy: float, span: float) -> float:
-    """Returns a bound of the cheap rate's norm over a span: it grows by kappa n^2 and by what acts."""
+    """Returns a bound of the length n of own^T y over a span. [EB] eqs. (31), (35)."""
     top = energy + found.pushed * span
     for _ in range(100):
         wanted = (energy + (found.own_cubic * top * top + found.pushed) * span) * SLACK
@@ -173,9 +200,8 @@ def _flown(scene: Scene, found: RangeSuprema, times: Array, step: float) -> Prov
     if len(times) == 1:
         ends = np.linspace(0.0, duration, SEGMENTS + 1)[1:]
     spans = np.diff(np.append(0.0, ends))
-    start = np.array(scene.rotation.angular_velocity, dtype=float)
-    boxes = _rate_boxes(found, start, spans)
-    law, whole, method = _Carried(found.rate_share), _Carried(found.rate_share), _method(scene)
+    boxes, method = _boxes(found, spans), _method(scene)
+    law = whole = _Carried(found.rate_share, energy=found.begun)
     of_law, law_rate, of_all, rate = (np.full(len(times), inf) for _ in range(4))
     begun, most = 0.0, [0.0, 0.0]
     for end, span, (low, high) in zip(ends, spans, boxes, strict=True):
@@ -184,16 +210,17 @@ def _flown(scene: Scene, found: RangeSuprema, times: Array, step: float) -> Prov
             break
         growth = growth_over(found, low, high)
         residual = 0.0 if scene.rotation.law == "tensor" else residual_over(found, low, high)
+        off = off_over(found, low, high)
         most = [max(most[0], growth), max(most[1], residual)]
         added = _method_sources(scene, found, (low, high), step, method)
         inside = np.flatnonzero((times > begun + 1e-9 * step) & (times <= end * (1 + 1e-12)))
         for i in inside:
-            there = law.after(times[i] - begun, growth, found.cubic, residual, 0.0)
-            of_law[i], law_rate[i] = there.angle, there.rate_share * there.energy
-            there = whole.after(times[i] - begun, growth, found.cubic, residual + added[1], added[0])
-            of_all[i], rate[i] = there.angle, there.rate_share * there.energy
-        law = law.after(span, growth, found.cubic, residual, 0.0)
-        whole = whole.after(span, growth, found.cubic, residual + added[1], added[0])
+            there = law.after(times[i] - begun, growth, found.cubic, residual, off)
+            of_law[i], law_rate[i] = there.angle, there.rate_share * there.energy + off
+            there = whole.after(times[i] - begun, growth, found.cubic, residual + added[1], off + added[0])
+            of_all[i], rate[i] = there.angle, there.rate_share * there.energy + off
+        law = law.after(span, growth, found.cubic, residual, off)
+        whole = whole.after(span, growth, found.cubic, residual + added[1], off + added[0])
         begun = float(end)
     why = ""
     if not isfinite(of_law[-1]):
@@ -242,22 +269,23 @@ def _method_sources(
     What rk4 leaves out is that of a single sub-step: smaller ones leave out less. Its rounding is of all.
     Of other methods each communication step adds the tolerance.
     """
-    speed = float(np.linalg.norm(np.maximum(np.abs(box[0]), np.abs(box[1]))))
+    rates = rates_over(found, *box)
+    speed = float(np.linalg.norm(rates))
     if method == "estimate":
         tolerance = scene.rotation.tolerance
         return tolerance / step, tolerance * speed * found.heaviest / step
     constants = remainder_of("rk4")
-    weights = np.array([1.0 if i == j else 0.5 for i, j in PAIRS])
-    coupling = max(float(np.sqrt(((found.pull**2) * weights).sum())), LEAST_COUPLING)
-    v = speed + sqrt(float(np.linalg.norm(found.push)) / coupling)
+    coupling = max(found.law.coupling, LEAST_COUPLING)
+    spin = float(np.linalg.norm(found.law.turn))
+    v = speed + max(sqrt(float(np.linalg.norm(found.law.push)) / coupling), 0.5 * spin / coupling)
     z = coupling * v * step
     if z > constants.limit:
         return inf, inf
     power = float(z**constants.power)
-    fastest = float(np.linalg.norm(fastest_change(found, *box)))
-    angle = scene.rotation.max_angle_step  # as many sub-steps as `fastest_square` asks for
-    sub_steps = 1 + ceil(step * sqrt(1.5 * speed * speed + 3.0 * angle * fastest) / angle)
+    fastest = float(np.linalg.norm(found.law.fastest(rates)))
+    sub_steps = _most_sub_steps(scene.rotation.max_angle_step, step, speed, fastest, found.spin_rate)
     rounding = 0.5 * EPSILON * (4.0 * speed * sub_steps + DEPTH * step * fastest)
+    rounding += 0.5 * EPSILON * CHANGES * CHANGE_DEPTH * (found.change_speed * speed + found.change_spin)
     rate = constants.rate * v * power * bool(LAWS[scene.rotation.law].products) + rounding
     turn = pi * (
         float(constants.turn) * power
@@ -265,3 +293,16 @@ def _method_sources(
         + 0.5 * step * rate
     )
     return turn / step * SLACK, found.heaviest * rate / step * SLACK
+
+
+def _most_sub_steps(angle: float, step: float, speed: float, fastest: float, spin_rate: float) -> int:
+    """Returns as many sub-steps as `propagators.bound.fastest_square` asks for at most, angle <= 1 rad.
+
+    speed     : largest rate [rad/s]
+    fastest   : largest acceleration [rad/s2]
+    spin_rate : largest size of what the spin of moving parts adds to the acceleration, over the rate [rad/s]
+    There e <= 1.5 and f <= 1.5 angle, and where ports move e <= 4.1 and f <= 2.2 angle.
+    """
+    e, f = (4.1, 2.2) if spin_rate else (1.5, 1.5)
+    square = e * speed * speed + 2.0 * f * angle * fastest + (f * angle + 1.0) * spin_rate * spin_rate
+    return 1 + ceil(step * sqrt(square) / angle)

@@ -1,25 +1,29 @@
 """What a law and the law "tensor" do at most over the ranges of a scene's inputs, by interval arithmetic.
 
-The norm is that of one fixed tensor K: [EB] eqs. (29) to (32), model/docs/error_bound.md.
+The norm is that of one fixed tensor K: [EB] eqs. (29) to (42), model/docs/error_bound.md.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import product
-from math import sqrt
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from fmu_build.accuracy.compared import (
+    PAIRS,
+    Compared,
+    acted_on,
+    momenta_compared,
+    rates_compared,
+    shift_of,
+)
 from fmu_build.accuracy.intervals import Interval, boxes_of, over_boxes
-from supervessel.composite.actions import torque_about_barycentre
-from supervessel.composite.inertia import from_upper_triangle, ldl, ldl_inverse, upper_triangle
-from supervessel.composite.parts import composite_graph
+from supervessel.composite.parts import CompositeGraph, composite_graph
 from supervessel.composite.resolved import ResolvedScene
-from supervessel.rotation.laws import LAWS, MIXED_PRODUCTS, SQUARES
 from supervessel.scene.numbers import EPSILON
-from supervessel.scene.schema import Law
+from supervessel.scene.schema import Kept
 
 Array = NDArray[np.float64]
 Bounds = Mapping[str, tuple[float, float]]
@@ -33,37 +37,90 @@ MOST_DOCKS = 6
 SLACK = 1.0 + 1e-9
 """What rounding of the scalar sums, of some hundreds of positive terms, and of eigenvalues may lose."""
 
-PAIRS = (*MIXED_PRODUCTS, *SQUARES)
-"""Products of two rates, in the order of columns."""
+
+@dataclass(frozen=True)
+class LargestResponse:
+    """Largest sizes of y': by what acts, (3,), by products of y, (3, 6), by y, (3, 3)."""
+
+    push: Array
+    pull: Array
+    turn: Array
+
+    @property
+    def coupling(self) -> float:
+        """The g of [EB] eq. (23)."""
+        weights = np.array([1.0 if i == j else 0.5 for i, j in PAIRS])
+        return float(np.sqrt((self.pull**2 * weights).sum()))
+
+    def fastest(self, sizes: Array) -> Array:
+        """Returns the largest sizes of y', (3,), of sizes of y, (3,)."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            pairs = np.array([sizes[i] * sizes[j] for i, j in PAIRS])
+            return np.asarray(self.push + self.pull @ pairs + self.turn @ sizes)
+
+
+@dataclass(frozen=True)
+class Affine:
+    """A linear map of y, (boxes, 3, 3), and a constant, (boxes, 3, 1): middles and half widths of each."""
+
+    linear: Interval
+    constant: Interval
+
+    def sizes(self, low: Array, high: Array) -> Array:
+        """Returns the largest sizes, (boxes, 3), over a box of y."""
+        mean, spread = _mean_and_spread(low, high)
+        (linear, blurred), (constant, off) = self.linear, self.constant
+        middle = np.abs(linear @ mean + constant[:, :, 0])
+        return np.asarray(
+            (middle + np.abs(linear) @ spread + blurred @ _sizes(low, high) + off[:, :, 0]) * SLACK
+        )
 
 
 @dataclass(frozen=True)
 class RangeSuprema:
-    """What a law and the law "tensor" do over boxes of what shapes the composite; [EB] eqs. (29) to (32).
+    """What a law and the law "tensor" do over boxes of what shapes the composite; see `compared.Compared`.
 
-    push, pull  : largest acceleration under the law by what acts, (3,) [rad/s2], by products of rates, (3, 6)
-    forms       : growth by each rate, (boxes, 3, 3, 3): middles and half widths
-    left        : residual by products of rates, (boxes, 3, 6): middles and half widths
-    left_acting : largest residual by what acts [J^(1/2)/s]
-    cubic       : kappa of [EB] eq. (31)
-    own         : lower factor of the tensor that the law turns where the true one is K
-    own_cubic   : kappa of [EB] eq. (31) of that tensor and that law
-    pushed      : largest acceleration under the law by what acts, in the norm of that tensor
-    rate_share  : 1/sqrt(least moment of K)
-    heaviest    : Frobenius norm of K's factor
+    start        : box of y at the start, (3,) and (3,)
+    begun        : largest error at the start, in the norm of K
+    shift        : c, (3,)
+    cheap, law   : responses of y and of the rate under the law
+    forms        : growth by each component of y + c, and without, (boxes, 4, 3, 3): middles and half widths
+    left         : residual by products of y, (boxes, 3, 6): middles and half widths
+    left_affine  : the rest of the residual but for what acts
+    left_acting  : largest residual by what acts [J^(1/2)/s]
+    cubic        : kappa of [EB] eq. (31) or (39)
+    own          : (3, 3), the law's own motion is bounded by the length n of own^T y:
+    own_cubic    : n' <= own_cubic n^2 + pushed
+    pushed       : see there
+    rate_share   : largest difference of rates by the error in the norm of K
+    off          : difference of rates beside it
+    rate         : the law's rate
+    heaviest     : largest error in the norm of K by an error of the law's rate
+    change_speed : rounding of a change of inputs, over u and roundings: by the rate [1]; [EB] eq. (42)
+    change_spin  : and by the spin of moving parts [rad/s]
+    spin_rate    : largest |h| trace(J^-1) [rad/s]
     """
 
-    push: Array
-    pull: Array
+    start: tuple[Array, Array]
+    begun: float
+    shift: Array
+    cheap: LargestResponse
+    law: LargestResponse
     forms: Interval
     left: Interval
+    left_affine: Affine
     left_acting: float
     cubic: float
     own: Array
     own_cubic: float
     pushed: float
     rate_share: float
+    off: Affine
+    rate: Affine
     heaviest: float
+    change_speed: float
+    change_spin: float
+    spin_rate: float
 
 
 def ranges_of(resolved: ResolvedScene) -> dict[str, tuple[float, float]]:
@@ -88,107 +145,104 @@ def _boxes(resolved: ResolvedScene, ranges: Bounds) -> tuple[Array, Array]:
     return np.concatenate(lows), np.concatenate(highs)
 
 
-def range_suprema(resolved: ResolvedScene, ranges: Bounds) -> RangeSuprema | None:
-    """Returns what the bound needs of a scene's ranges; None where the tensor may be singular."""
+def range_suprema(resolved: ResolvedScene, ranges: Bounds, kept: Kept) -> RangeSuprema | None:
+    """Returns what the bound needs of a scene's ranges; None where the tensor may be singular.
+
+    kept : what every change of the inputs keeps, "rate" or "momentum"
+    """
     low, high = _boxes(resolved, ranges)
     graph = composite_graph(resolved)
     inertia = ca.Function("inertia", [graph.p], [ca.densify(graph.c[graph.slices["inertia"]])])
     least, most = over_boxes(inertia, low, high)[0]
     if not (np.isfinite(least).all() and np.isfinite(most).all()):
         return None
-    middle: Array = _tensor_of(0.5 * (least.min(axis=0) + most.max(axis=0)))
+    middle = _tensor_of(0.5 * (least.min(axis=0) + most.max(axis=0)))
     if np.linalg.eigvalsh(middle)[0] <= 0.0:
         return None
-    factor: Array = np.array(np.linalg.cholesky(middle), dtype=np.float64)
+    begin = np.array([[v.start for v in resolved.shaping]], dtype=float)
+    low, high = np.concatenate([begin, low]), np.concatenate([begin, high])
+    law, start = resolved.scene.rotation.law, np.array(resolved.scene.rotation.angular_velocity, dtype=float)
+    body = acted_on(resolved, graph.parts(graph.c))
+    if kept == "momentum":
+        shift = _at(graph, shift_of(law, body.inertia, start), begin[0])
+        compared = momenta_compared(law, body, middle, start, shift)
+    else:
+        compared = rates_compared(law, body, middle, start)
+    found = _over_boxes(compared, graph.p, (low, high))
+    return None if found is None else _suprema(compared, found, resolved, ranges)
+
+
+def _suprema(
+    compared: Compared, found: Mapping[str, Interval], resolved: ResolvedScene, ranges: Bounds
+) -> RangeSuprema:
+    """Returns suprema of what `_over_boxes` has found; its first box, the start's values, is among them."""
     acting = [ranges[v.name] for v in resolved.acting]
     sizes = np.array([max(abs(a), abs(b)) for a, b in acting], dtype=float)
-    turning = np.diag(np.diag(middle)) if resolved.scene.rotation.law == "principal" else middle
-    own: Array = np.array(np.linalg.cholesky(turning), dtype=np.float64)
-    function = _matrices(resolved, graph.p, graph.parts(graph.c), (factor, own))
-    results = over_boxes(function, low, high)
+    D, h, inverse = (_frobenius(found[name]) for name in ("kept_tensor", "kept_spin", "kept_inverse"))
+    low, high = found["start"]
+    return RangeSuprema(
+        start=(low.min(axis=0), high.max(axis=0)),
+        begun=SLACK * _frobenius(found["begun"]),
+        shift=compared.shift,
+        cheap=_response(found, "cheap", sizes),
+        law=_response(found, "law", sizes),
+        forms=_middle_and_half(found["forms"], (-1, 4, 3, 3)),
+        left=_middle_and_half(found["left_products"], (-1, 3, len(PAIRS))),
+        left_affine=_affine(found, "left"),
+        left_acting=_by_acting(found["left_acting"], resolved, ranges),
+        cubic=SLACK * _frobenius(found["apart"]) * _frobenius(found["turned"]),
+        own=compared.own,
+        own_cubic=SLACK * _frobenius(found["own_apart"]) * _frobenius(found["own_turned"]),
+        pushed=_by_acting(found["own_pushed"], resolved, ranges),
+        rate_share=_longest(found["by_error"]),
+        off=_affine(found, "off"),
+        rate=_affine(found, "rate"),
+        heaviest=SLACK * _frobenius(found["by_rate"]),
+        change_speed=6.0 * SLACK * inverse * D,
+        change_spin=2.0 * SLACK * inverse * h,
+        spin_rate=_frobenius(found["spin_rate"]),
+    )
+
+
+def _expressions(compared: Compared) -> dict[str, ca.SX]:
+    """Returns all that is looked at over boxes, by name."""
+    found = {"forms": ca.vertcat(*compared.forms)}
+    for name in ("cheap", "law", "left"):
+        motion = getattr(compared, name)
+        found |= {f"{name}_{one.name}": getattr(motion, one.name) for one in fields(motion)}
+    found |= {
+        name: getattr(compared, name)
+        for name in (
+            "apart",
+            "turned",
+            "own_pushed",
+            "by_error",
+            "by_rate",
+            "start",
+            "begun",
+            "spin_rate",
+        )
+    }
+    found["own_apart"], found["own_turned"] = compared.own_cubic
+    for name in ("off", "rate"):
+        found[f"{name}_linear"], found[f"{name}_constant"] = getattr(compared, name)
+    found["kept_tensor"], found["kept_spin"], found["kept_inverse"] = compared.kept
+    return found
+
+
+def _over_boxes(compared: Compared, p: ca.SX, boxes: tuple[Array, Array]) -> dict[str, Interval] | None:
+    """Returns all that is looked at, each flat, rows first, over boxes of p; None where it is not finite."""
+    found = _expressions(compared)
+    flat = [ca.densify(ca.vec(ca.densify(one).T)) for one in found.values()]
+    results = over_boxes(ca.Function("compared", [p], flat), *boxes)
     if not all(np.isfinite(end).all() for pair in results for end in pair):
         return None
-    push, pull, forms, left, left_acting, apart, turned, own_apart, own_turned, pushed = results
-    return RangeSuprema(
-        push=_largest(push, (3, len(sizes))) @ sizes,
-        pull=_largest(pull, (3, len(PAIRS))),
-        forms=_middle_and_half(forms, (len(low), 3, 3, 3)),
-        left=_middle_and_half(left, (len(low), 3, len(PAIRS))),
-        left_acting=_by_acting(left_acting, resolved, ranges),
-        cubic=SLACK * _frobenius(apart) * _frobenius(turned),
-        own=own,
-        own_cubic=SLACK * _frobenius(own_apart) * _frobenius(own_turned),
-        pushed=_by_acting(pushed, resolved, ranges),
-        rate_share=SLACK / sqrt(float(np.linalg.eigvalsh(middle)[0])),
-        heaviest=float(np.linalg.norm(factor)),
-    )
+    return dict(zip(found, results, strict=True))
 
 
-def _matrices(
-    resolved: ResolvedScene, p: ca.SX, parts: Mapping[str, ca.SX], factors: tuple[Array, Array]
-) -> ca.Function:
-    """Returns p -> what `range_suprema` needs, each flat, rows first. [EB] eqs. (29) to (32).
-
-    factors : lower factors of K, and of the tensor that the law turns where the true one is K
-    """
-    factor, turning = factors
-    law: Law = resolved.scene.rotation.law
-    J = from_upper_triangle(parts["inertia"])
-    inverse = ldl_inverse(*ldl(J))
-    D = ca.diag(ca.diag(J)) if law == "principal" else J
-    u = ca.SX.sym("u", len(resolved.acting))
-    arm = ca.jacobian(torque_about_barycentre(resolved, parts, u), u) if u.numel() else ca.SX.zeros(3, 0)
-    own, own_pull = _response(law, J, inverse)
-    right, right_pull = _response("tensor", J, inverse)
-    T, back = ca.SX(factor.T), ca.SX(np.linalg.inv(factor.T))
-    forms = []
-    for k in range(3):
-        columns = [2.0 * (right_pull @ _pair_products(k, j)) for j in range(3)]
-        matrix = T @ ca.horzcat(*columns) @ back
-        forms.append(0.5 * (matrix + matrix.T))
-    results = (
-        own @ arm,
-        own_pull,
-        ca.vertcat(*forms),
-        T @ (own_pull - right_pull),
-        T @ ((own - right) @ arm),
-        *_cubic(J, inverse, factor),
-        *_cubic(D, ldl_inverse(*ldl(D)), turning),
-        ca.SX(turning.T) @ own @ arm,
-    )
-    return ca.Function("matrices", [p], [ca.densify(ca.vec(ca.densify(result).T)) for result in results])
-
-
-def _cubic(J: ca.SX, inverse: ca.SX, factor: Array) -> tuple[ca.SX, ca.SX]:
-    """Returns F, (3, 3), and the forms, (3, 6), whose Frobenius norms multiply to kappa. [EB] eq. (31)."""
-    T, back, lower = ca.SX(factor.T), ca.SX(np.linalg.inv(factor.T)), ca.SX(np.linalg.inv(factor))
-    turned = []
-    for j, k in PAIRS:
-        b, d = back[:, j], back[:, k]
-        form = 0.5 * (ca.cross(b, J @ d) + ca.cross(d, J @ b))
-        turned.append(lower @ form * (1.0 if j == k else sqrt(2.0)))
-    return T @ inverse @ T.T - ca.SX.eye(3), ca.horzcat(*turned)
-
-
-def _response(law: Law, J: ca.SX, inverse: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Returns what a law makes of torque, (3, 3), and of PAIRS of rates, (3, 6), without the law's scale."""
-    numbers = {
-        "none": ca.SX(0, 1),
-        "decoupled": 1.0 / ca.diag(J),
-        "principal": ca.vertcat(ca.diag(J), 1.0 / ca.diag(J), 1.0),
-        "tensor": ca.vertcat(upper_triangle(J), upper_triangle(inverse), 1.0),
-    }[law]
-    rules = LAWS[law]
-    still = ca.SX.zeros(3)
-    by_torque = ca.horzcat(*(rules.acceleration(numbers, still, axis) for axis in ca.horzsplit(ca.SX.eye(3))))
-    pull = rules.gyroscopic(numbers)
-    return ca.densify(by_torque), ca.horzcat(pull, ca.SX.zeros(3, len(PAIRS) - pull.size2()))
-
-
-def _pair_products(k: int, j: int) -> ca.SX:
-    """Returns the symmetric products, (6,), of the unit vectors k and j."""
-    a, b = ca.SX.eye(3)[:, k], ca.SX.eye(3)[:, j]
-    return ca.vertcat(*(0.5 * (a[m] * b[n] + a[n] * b[m]) for m, n in PAIRS))
+def _at(graph: CompositeGraph, expression: ca.SX, p: Array) -> Array:
+    """Returns the value of an expression of the inputs that shape the composite."""
+    return np.array(ca.Function("value", [graph.p], [ca.densify(expression)])(p)).ravel()
 
 
 def _tensor_of(six: Array) -> Array:
@@ -196,7 +250,24 @@ def _tensor_of(six: Array) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def _largest(interval: Interval, shape: tuple[int, int]) -> Array:
+def _response(found: Mapping[str, Interval], name: str, acting: Array) -> LargestResponse:
+    """Returns the largest response of a quadratic; acting : largest sizes of what acts, (m,)."""
+    return LargestResponse(
+        _largest(found[f"{name}_acting"], (3, len(acting))) @ acting
+        + _largest(found[f"{name}_constant"], (3,)),
+        _largest(found[f"{name}_products"], (3, len(PAIRS))),
+        _largest(found[f"{name}_linear"], (3, 3)),
+    )
+
+
+def _affine(found: Mapping[str, Interval], name: str) -> Affine:
+    return Affine(
+        _middle_and_half(found[f"{name}_linear"], (-1, 3, 3)),
+        _middle_and_half(found[f"{name}_constant"], (-1, 3, 1)),
+    )
+
+
+def _largest(interval: Interval, shape: tuple[int, ...]) -> Array:
     """Returns the largest size of each element over all boxes."""
     sizes = np.maximum(np.abs(interval[0]), np.abs(interval[1]))
     return np.asarray(sizes.max(axis=0).reshape(shape))
@@ -206,6 +277,13 @@ def _frobenius(interval: Interval) -> float:
     """Returns the largest Frobenius norm over all boxes."""
     sizes = np.maximum(np.abs(interval[0]), np.abs(interval[1]))
     return float(np.linalg.norm(sizes, axis=1).max())
+
+
+def _longest(interval: Interval) -> float:
+    """Returns the largest singular value of (3, 3) matrices over all boxes."""
+    middle, half = _middle_and_half(interval, (-1, 3, 3))
+    values = np.linalg.svd(middle, compute_uv=False)[:, 0] + np.linalg.norm(half, axis=(1, 2))
+    return float(values.max()) * SLACK
 
 
 def _middle_and_half(interval: Interval, shape: tuple[int, ...]) -> Interval:
@@ -231,27 +309,31 @@ def _by_acting(interval: Interval, resolved: ResolvedScene, ranges: Bounds) -> f
     return float((np.linalg.norm(middle @ corners, axis=1).max(axis=1) + blurred).max()) * SLACK
 
 
-def fastest_change(found: RangeSuprema, low: Array, high: Array) -> Array:
-    sizes = np.maximum(np.abs(low), np.abs(high))
-    with np.errstate(invalid="ignore", over="ignore"):
-        return np.asarray(found.push + found.pull @ np.array([sizes[i] * sizes[j] for i, j in PAIRS]))
+def _sizes(low: Array, high: Array) -> Array:
+    return np.maximum(np.abs(low), np.abs(high))
+
+
+def _mean_and_spread(low: Array, high: Array) -> tuple[Array, Array]:
+    """Returns the middle of a box and its half widths, the latter with what rounding loses."""
+    return 0.5 * (low + high), 0.5 * (high - low) * SLACK + EPSILON * _sizes(low, high)
 
 
 def growth_over(found: RangeSuprema, low: Array, high: Array) -> float:
-    """Returns the largest growth over a box of rates and all boxes. [EB] eq. (30)."""
+    """Returns the largest growth over a box of y and all boxes. [EB] eqs. (30), (38)."""
     middle, half = found.forms
-    sizes = np.maximum(np.abs(low), np.abs(high))
-    blurred = np.linalg.norm(np.einsum("k,bkij->bij", sizes, half), axis=(1, 2))
+    low, high = np.nextafter(low + found.shift, -np.inf), np.nextafter(high + found.shift, np.inf)
+    weights = np.append(_sizes(low, high), 1.0)
+    blurred = np.linalg.norm(np.einsum("k,bkij->bij", weights, half), axis=(1, 2))
     largest = 0.0
     for corner in {tuple(c) for c in product(*zip(low, high, strict=True))}:
-        S = np.einsum("k,bkij->bij", np.array(corner), middle)
-        values = np.linalg.eigvalsh(S)[:, -1] + blurred + 64 * EPSILON * np.linalg.norm(S, axis=(1, 2))
-        largest = max(largest, float(values.max()))
+        S = np.einsum("k,bkij->bij", np.array([*corner, 1.0]), middle)
+        lost = 64 * EPSILON * np.einsum("k,bkij->bij", weights, np.abs(middle)).sum(axis=(1, 2))
+        largest = max(largest, float((np.linalg.eigvalsh(S)[:, -1] + blurred + lost).max()))
     return largest * SLACK
 
 
 def residual_over(found: RangeSuprema, low: Array, high: Array) -> float:
-    """Returns the largest residual over a box of rates, all boxes and what acts. [EB] eq. (32)."""
+    """Returns the largest residual over a box of y, all boxes and what acts. [EB] eqs. (32), (40)."""
     middle, half = found.left
     ends = [[a * b for a in (low[i], high[i]) for b in (low[j], high[j])] for i, j in PAIRS]
     least, most = np.array([min(e) for e in ends]), np.array([max(e) for e in ends])
@@ -259,9 +341,20 @@ def residual_over(found: RangeSuprema, low: Array, high: Array) -> float:
     for k in squares:
         i = PAIRS[k][0]
         least[k] = 0.0 if low[i] <= 0.0 <= high[i] else min(low[i] ** 2, high[i] ** 2)
-    mean, spread = 0.5 * (least + most), 0.5 * (most - least) * SLACK
-    by_rates = np.linalg.norm(
-        np.abs(middle @ mean) + np.abs(middle) @ spread + half @ np.maximum(np.abs(least), np.abs(most)),
-        axis=1,
-    )
-    return (float(by_rates.max()) + found.left_acting) * SLACK
+    mean, spread = _mean_and_spread(least, most)
+    mean_of_y, spread_of_y = _mean_and_spread(low, high)
+    (linear, linear_half), (constant, constant_half) = found.left_affine.linear, found.left_affine.constant
+    at_mean = np.abs(middle @ mean + linear @ mean_of_y + constant[:, :, 0])
+    beside = np.abs(middle) @ spread + half @ _sizes(least, most)
+    beside += np.abs(linear) @ spread_of_y + linear_half @ _sizes(low, high) + constant_half[:, :, 0]
+    return (float(np.linalg.norm(at_mean + beside, axis=1).max()) + found.left_acting) * SLACK
+
+
+def off_over(found: RangeSuprema, low: Array, high: Array) -> float:
+    """Returns the largest difference of rates [rad/s] that the error does not make. [EB] eq. (41)."""
+    return float(np.linalg.norm(found.off.sizes(low, high), axis=1).max())
+
+
+def rates_over(found: RangeSuprema, low: Array, high: Array) -> Array:
+    """Returns the largest sizes of the law's rate, (3,) [rad/s], over a box of y."""
+    return np.asarray(found.rate.sizes(low, high).max(axis=0))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fmu_build.accuracy import proven, range_suprema
+from fmu_build.accuracy import compared, proven, range_suprema
 from fmu_build.accuracy.intervals import boxes_of, over_boxes
 from fmu_build.accuracy.proven import proven_bound, to_narrow
 from supervessel import Scene, Twin, parse_scene
@@ -138,7 +138,12 @@ def test_refusals_say_what_is_in_the_way() -> None:
     rotation = scene.rotation.model_copy(update={"mass_change": "momentum"})
     kept = scene.model_copy(update={"rotation": rotation})
     assert proven_bound(kept, 10.0, 1.0).why == (
-        "growth: changes of mass that keep the momentum are not bounded over ranges"
+        "growth: changes of mass keep the momentum, changes of docked the rate: "
+        "in turns they may speed the body up at every step"
+    )
+    moving = scene.inputs.model_copy(update={"range": scene.inputs.range | {"tug.rate": (0.0, 0.1)}})
+    assert proven_bound(scene.model_copy(update={"inputs": moving}), 10.0, 1.0).why == (
+        "growth: tug.rate[1]: docks that close in motion may speed the body up at every step"
     )
     open_range = {"range": {key: v for key, v in scene.inputs.range.items() if key != "B.mass"}}
     inputs = scene.inputs.model_copy(update=open_range)
@@ -196,7 +201,7 @@ def test_boxes_cover_a_range_and_no_more() -> None:
 def test_what_the_code_cites_is_on_the_page() -> None:
     page = (ROOT / "model" / "docs" / "error_bound.md").read_text(encoding="utf-8")
     tags = {int(number) for number in re.findall(r"\\tag\{(\d+)\}", page)}
-    text = "".join(Path(m.__file__).read_text(encoding="utf-8") for m in (proven, range_suprema))
+    text = "".join(Path(m.__file__).read_text(encoding="utf-8") for m in (proven, range_suprema, compared))
     cited = re.findall(r"\[EB\]\s+eqs?\.((?:(?:\s|,|to|and)*\(\d+\))+)", text)
     numbers = {int(number) for group in cited for number in re.findall(r"\d+", group)}
     assert len(numbers) > 4
