@@ -5,7 +5,7 @@ It is flown by FMPy through other histories than the choice's, against the numpy
 
 import json
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 from fmpy import extract, read_model_description
 from fmpy.fmi3 import FMU3Slave
-from scipy.integrate import solve_ivp
+from fmpy.model_description import ModelDescription
 
+from accuracy.truth import after_a_step
 from fmu_build import BuildError, build_fmu
 from fmu_build.flight.distance import attitude_apart
 from supervessel import Scene, parse_scene, reference
 from supervessel.composite.resolved import resolve
 
-RTOL, ATOL = 1e-13, 1e-15
 HELD = 25
 """Pieces of a history in which inputs are held, at most."""
 
@@ -198,50 +198,48 @@ def flight(scene: Scene, kind: str, seed: int) -> Iterator[tuple[dict[str, float
             if before is not None:
                 omega = reference.change(scene, omega, before, values)
             prepared = {
-                "J": reference.composite(scene, values).inertia,
-                "M": reference.external_torque(scene, values),
+                "J": reference.composite(scene, values).inertia[None],
+                "M": reference.external_torque(scene, values)[None],
             }
         before = values
-        end = _exact(np.append(attitude, omega), accuracy.step, **prepared)
-        attitude, omega = end[:4] / np.linalg.norm(end[:4]), end[4:]
-        yield values, np.append(attitude, omega)
-
-
-def _exact(state: np.ndarray, span: float, J: np.ndarray, M: np.ndarray) -> np.ndarray:
-    """Returns the state after a span of constant inputs."""
-    inverse, unit = np.linalg.inv(J), max(float(np.linalg.norm(state[4:])) * span, 1e-3) / span
-
-    def rate(_: float, y: np.ndarray) -> np.ndarray:
-        (w, x, y_, z), (a, b, c) = y[:4], y[4:] * unit
-        L = J @ (y[4:] * unit)
-        push = np.array([M[0] - b * L[2] + c * L[1], M[1] - c * L[0] + a * L[2], M[2] - a * L[1] + b * L[0]])
-        turn = [
-            -x * a - y_ * b - z * c,
-            w * a + y_ * c - z * b,
-            w * b + z * a - x * c,
-            w * c + x * b - y_ * a,
-        ]
-        return np.concatenate([0.5 * np.array(turn), inverse @ push / unit])
-
-    scaled = np.append(state[:4], state[4:] / unit)
-    found = solve_ivp(rate, (0.0, span), scaled, "DOP853", rtol=RTOL, atol=ATOL)
-    assert found.success, found.message
-    end: np.ndarray = found.y[:, -1]
-    return np.append(end[:4], end[4:] * unit)
+        state = after_a_step(np.append(attitude, omega)[None], accuracy.step, **prepared)[0]
+        attitude, omega = state[:4], state[4:]
+        yield values, state
 
 
 def flown(fmu: Path, scene: Scene, rows: list[dict[str, float]]) -> np.ndarray:
     """Returns attitude and rate at the end of each step, (steps, 7), of an FMU whose inputs are rows."""
-    assert scene.accuracy is not None
+    return flown_each(fmu, scene, [rows])[0]
+
+
+def flown_each(
+    fmu: Path, scene: Scene, courses: Iterable[list[dict[str, float]]], scalars: Iterable[str] = ()
+) -> list[np.ndarray]:
+    """Returns attitude, rate and scalar outputs after each step, (steps, 7 + m) each, of an FMU's flights.
+
+    courses : inputs of each flight, step by step
+    scalars : names of outputs; those that the FMU does not have are NaN
+    """
     folder = fmu.with_suffix(".dir")
     extract(str(fmu), unzipdir=str(folder))
     description = read_model_description(str(folder), validate=False)
     references = {v.name: v.valueReference for v in description.modelVariables}
-    shown = [
-        references[f"{n}[{i}]"]
-        for n, m in (("attitude", 4), ("angular_velocity", 3))
-        for i in range(1, m + 1)
-    ]
+    return [_flight(scene, rows, folder, description, references, tuple(scalars)) for rows in courses]
+
+
+def _flight(  # noqa: PLR0917
+    scene: Scene,
+    rows: list[dict[str, float]],
+    folder: Path,
+    description: ModelDescription,
+    references: Mapping[str, int],
+    scalars: tuple[str, ...],
+) -> np.ndarray:
+    assert scene.accuracy is not None
+    names = [f"{n}[{i}]" for n, m in (("attitude", 4), ("angular_velocity", 3)) for i in range(1, m + 1)]
+    names += [name for name in scalars if name in references]
+    known = [*range(7), *(7 + i for i, name in enumerate(scalars) if name in references)]
+    shown = [references[name] for name in names]
     instance = FMU3Slave(
         guid=description.guid,
         unzipDirectory=str(folder),
@@ -249,7 +247,7 @@ def flown(fmu: Path, scene: Scene, rows: list[dict[str, float]]) -> np.ndarray:
         instanceName="confirmed",
     )
     instance.instantiate()
-    states, before = [], None
+    states, before = np.full((len(rows), 7 + len(scalars)), np.nan), None
     try:
         instance.enterInitializationMode()
         for i, row in enumerate(rows):
@@ -259,11 +257,11 @@ def flown(fmu: Path, scene: Scene, rows: list[dict[str, float]]) -> np.ndarray:
             if i == 0:
                 instance.exitInitializationMode()
             instance.doStep(i * scene.accuracy.step, scene.accuracy.step)
-            states.append(list(instance.getFloat64(shown)))
+            states[i, known] = instance.getFloat64(shown)
         instance.terminate()
     finally:
         instance.freeInstance()
-    return np.array(states)
+    return states
 
 
 def _set(instance: FMU3Slave, references: Mapping[str, int], row: Mapping[str, float]) -> None:
