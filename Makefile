@@ -63,6 +63,7 @@ stability: .venv/installed-dev
 accuracy: .venv/installed-dev
 	$(BIN)/python -m pytest -m accuracy tests/accuracy
 	PYTHONPATH=tests $(BIN)/python -m accuracy.tightness
+	PYTHONPATH=tests $(BIN)/python -m accuracy.adversary --scenes 0:500
 
 surroundings: .venv/installed-dev
 	$(BIN)/python -m pytest -n auto -m surroundings tests

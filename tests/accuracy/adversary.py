@@ -64,8 +64,11 @@ class Flights:
     truth: Array
 
 
-def true_flights(scene: Scene, against: Sequence[Attack]) -> Flights:
-    """Returns the exact motion under the law tensor in attacks, and the inputs that these then are."""
+def true_flights(scene: Scene, against: Sequence[Attack], law: str = "tensor", rtol: float = RTOL) -> Flights:
+    """Returns the exact motion under a law in attacks, and the inputs that these then are.
+
+    rtol : of DOP853. Changes are those of the law tensor
+    """
     accuracy = scene.accuracy
     assert accuracy is not None
     ranges, steps = Ranges(scene), round(accuracy.horizon / accuracy.step)
@@ -87,23 +90,28 @@ def true_flights(scene: Scene, against: Sequence[Attack]) -> Flights:
             courses[i].append(ranges.values(row))
             bodies.append((ranges.inertia(row), ranges.torque(row)))
         J, M = (np.array(part) for part in zip(*bodies, strict=True))
-        states = after_a_step(states, accuracy.step, J, M)
+        if law in ("decoupled", "principal"):
+            J = J * np.eye(3)
+        if law == "none":
+            M = 0.0 * M
+        turning = float(law in ("tensor", "principal"))
+        states = after_a_step(states, accuracy.step, J, M, rtol, turning)
         found.append(states)
     return Flights([attack.name for attack in against], courses, np.array(found))
 
 
 def known_to(scene: Scene, flights: Flights) -> Array:
     """Returns how far the truth is from that of a coarser tolerance, (n,) [rad]: much more than it is off."""
-    fixed = [
+    coarse = true_flights(scene, again(flights), rtol=COARSER)
+    return _angles(coarse.truth, flights.truth).max(axis=0)
+
+
+def again(flights: Flights) -> list[Attack]:
+    """Returns attacks with the inputs of flights, whatever the motion."""
+    return [
         Attack(name, lambda step, omega, rows=rows: np.array(list(rows[step].values())))
         for name, rows in zip(flights.names, flights.rows, strict=True)
     ]
-    with (
-        mock.patch("accuracy.truth.RTOL", COARSER),
-        mock.patch.object(after_a_step, "__defaults__", (COARSER,)),
-    ):
-        coarse = true_flights(scene, fixed)
-    return _angles(coarse.truth, flights.truth).max(axis=0)
 
 
 def _angles(one: Array, other: Array) -> Array:
@@ -183,22 +191,28 @@ def judged(
     """Returns how near the flights of an FMU, (n, steps, 8), came to what is asked and to its bounds.
 
     truth : (n, steps, 7)
-    The keys `broken`, `bound_broken`, `law_broken`, `output_broken` name the attacks that did. Against a
-    bound or what is asked counts what is beyond the doubt about the truth.
+    The keys `broken`, `bound_broken` and `law_broken` name the attacks that did. Against a bound or what is
+    asked counts what is beyond the doubt about the truth. The bound of the law alone is held against the
+    law's own exact motion, which no method is part of.
     """
     asked, grade = evidence["asked"], evidence["grade"]
     angles = _angles(states, truth)
     attitude = angles.max(axis=1)
     rate = np.linalg.norm(states[..., 4:7] - truth[..., 4:], axis=2).max(axis=1)
     share = np.maximum(attitude / asked["attitude"], rate / asked["rate"] if asked["rate"] else 0.0)
-    bounds = {name: grade[name] for name in ("attitude", "law") if grade[name]}
-    output, close = states[..., 7], max(share.max(), *(attitude.max() / b for b in bounds.values()), 0.0)
+    output, bound = states[..., 7], grade["attitude"] or np.inf
+    close = max(share.max(), attitude.max() / bound)
     has_output = bool(np.isfinite(output).any())
     doubt = np.zeros(len(attitude))
     if close > NEAR or (has_output and np.any(angles > NEAR * output)):
         doubt = known_to(scene, flights)
     sure = attitude - doubt
-    leaves_out = evidence["choice"]["law"] != "tensor"
+    law = evidence["choice"]["law"]
+    by_law = np.zeros(len(attitude))
+    if law != "tensor" and grade["law"] is not None:
+        by_law = _angles(true_flights(scene, again(flights), law).truth, flights.truth).max(axis=0)
+        if by_law.max() > NEAR * grade["law"] and not doubt.any():
+            doubt = known_to(scene, flights)
     rates_off = bool(asked["rate"]) & (rate > (asked["rate"] or 0.0))
 
     def named(which: Array) -> list[str]:
@@ -210,7 +224,8 @@ def judged(
         "doubt": float(doubt.max()),
         "broken": named((sure > asked["attitude"]) | rates_off),
         "bound_broken": named(sure > grade["attitude"]) if grade["name"] == "proven" else [],
-        "law_broken": named(sure > grade["law"]) if leaves_out and grade["law"] is not None else [],
+        "law_broken": named(by_law - doubt > (np.inf if grade["law"] is None else grade["law"])),
+        "by_law": float(by_law.max()),
         "output": _of_output(output, angles, doubt, asked["attitude"], flights.names) if has_output else None,
     }
 

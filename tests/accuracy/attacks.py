@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from accuracy.confirm import usable
+from accuracy.growth import grown
 from supervessel import Scene, reference
 from supervessel.composite.resolved import resolve
 
@@ -19,6 +20,9 @@ Array = NDArray[np.float64]
 
 SEARCHED, ZOOMS, ZOOMED = 96, 8, 16
 """Rows that are drawn in a search of the ranges, and how often and with how many it is drawn closer."""
+
+WAVES = 24
+"""Square waves of which the one is flown along which errors grow most."""
 
 HELD = 25
 """Pieces in which random inputs are held, at most."""
@@ -135,23 +139,23 @@ def periods(ranges: Ranges, row: Array, spin: Array, horizon: float) -> tuple[fl
 
 
 def attacks(scene: Scene, seed: int) -> Iterator[Attack]:
-    """Yields the histories of a scene: 6 to 14, by what its inputs are."""
+    """Yields the histories of a scene: 6 to 12, by what its inputs are."""
     assert scene.accuracy is not None
     ranges, draw = Ranges(scene), np.random.default_rng([seed, 13])
     steps = round(scene.accuracy.horizon / scene.accuracy.step)
     spin = np.array(scene.rotation.angular_velocity)
-    if not np.any(spin):
-        spin = 1e-9 / scene.accuracy.horizon * np.ones(3)
+    criteria = {"growing": growing, "leaning": leaning} if np.any(spin) else {"lopsided": lopsided}
     if not ranges.names:
         yield Attack("as in the scene", lambda step, omega: ranges.start)
         return
     rows = []
-    for name, how in (("growing", growing), ("leaning", leaning), ("lopsided", lopsided)):
+    for name, how in criteria.items():
         row = worst(ranges, how, spin, draw)
         if not any(np.array_equal(row, other) for other in rows):
             rows.append(row)
             yield Attack(f"held, most {name}", lambda step, omega, row=row: row)
     yield from _waves(ranges, rows[0], spin, scene, draw)
+    yield _grown_waves(ranges, scene, steps, draw)
     if ranges.acting.any():
         yield from _pumps(ranges, rows[0], draw)
     yield from _wandering(ranges, steps, draw)
@@ -182,11 +186,28 @@ def _waves(
     every, none = np.ones_like(acting), np.zeros_like(acting)
     if acting.any():
         yield Attack("torque with the nutation", wave(nutation, acting, none))
-        yield Attack("torque with the turn", wave(turn, acting, none))
     yield Attack("all with the nutation", wave(nutation, every, none))
     if not acting.all():
         yield Attack("all with half the nutation's period", wave(0.5 * nutation, every, none))
         yield Attack("all with the turn, what acts a quarter later", wave(turn, every, acting))
+
+
+def _grown_waves(ranges: Ranges, scene: Scene, steps: int, draw: np.random.Generator) -> Attack:
+    """Returns the square wave, of many corners and periods, along which small errors grow most.
+
+    It stays at a corner for some steps and as long or twice as long at the opposite one.
+    """
+    waves = []
+    while len(waves) < WAVES:
+        here, half = np.round(draw.random(len(ranges.names))), int(draw.integers(1, 1 + max(1, steps // 3)))
+        ends = ranges.row(here), ranges.row(1.0 - here)
+        rows = np.arange(steps) % int(half * draw.integers(2, 4)) < half
+        if all(map(ranges.fits, ends)) or len(waves) == 0:
+            waves.append((ends if all(map(ranges.fits, ends)) else (ranges.start, ranges.start), rows))
+    inertias = np.array([[ranges.inertia(ends[int(k)]) for k in rows] for ends, rows in waves])
+    torques = np.array([[ranges.torque(ends[int(k)]) for k in rows] for ends, rows in waves])
+    (one, other), rows = waves[int(np.argmax(grown(scene, inertias, torques)))]
+    return Attack("to and fro, most growing", lambda step, omega: other if rows[step] else one)
 
 
 def _pumps(ranges: Ranges, row: Array, draw: np.random.Generator) -> Iterator[Attack]:
@@ -225,12 +246,10 @@ def _wandering(ranges: Ranges, steps: int, draw: np.random.Generator) -> Iterato
     walk = np.abs(
         (draw.random(n) + np.cumsum(0.15 * draw.normal(size=(pieces, n)), axis=0) + 1.0) % 2.0 - 1.0
     )
-    rising, teeth = draw.random(n) < 0.5, draw.uniform(0.5, 6.0, n)
-    saw = (np.arange(pieces)[:, None] / pieces * teeth + draw.random(n)) % 1.0
+    rising = draw.random(n) < 0.5
     shares = {
         "walk": walk,
         "ramp": np.abs(np.arange(pieces)[:, None] / max(pieces - 1, 1) - rising),
-        "saws": saw,
         "all anywhere": draw.random((pieces, n)),
     }
     for name, share in shares.items():
