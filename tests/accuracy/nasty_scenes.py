@@ -40,7 +40,7 @@ def scene_of(number: int) -> tuple[str, Raw]:
     inputs = raw["inputs"]
     span, most = float(inputs.pop("push", 0.0)), float(10.0 ** draw.uniform(-2.0, 0.0))
     if span:  # what acts turns the body by about as much as it turns by itself, or less
-        moments = np.diag(reference.composite(parse_scene(_plain(raw))).inertia)
+        moments = np.diag(reference.composite(parse_scene(plain(raw))).inertia)
         size = float(span * most * turn / horizon**2 * np.mean(moments))
         inputs["range"]["torque"] = [-size, size] if "sided" not in inputs else inputs.pop("sided")(size)
     low, high = (-5.0, -0.5) if slow else (-7.0, -2.0)
@@ -55,12 +55,12 @@ def scene_of(number: int) -> tuple[str, Raw]:
     return kind, raw
 
 
-def _plain(raw: Raw) -> Raw:
+def plain(raw: Raw) -> Raw:
     """Returns a scene without inputs and at rest, of which moments are taken."""
     return {key: value for key, value in raw.items() if key not in ("inputs", "rotation")}
 
 
-def _spin(draw: np.random.Generator, axis: int, rate: float, tilt: float) -> Raw:
+def spin_about(draw: np.random.Generator, axis: int, rate: float, tilt: float) -> Raw:
     """Returns [rotation] for a spin [rad/s] about a body axis that is tilted by a small angle [rad]."""
     direction = tilt * draw.normal(size=3)
     direction[axis] = 1.0
@@ -112,7 +112,7 @@ def middle_by_mass(draw: np.random.Generator, rate: float, _turn: float) -> Raw:
         "vessels": vessels,
         "docks": [{"ports": ["R.a", "T.a"]}],
         "inputs": inputs,
-        "rotation": _spin(draw, axis, rate, float(10.0 ** draw.uniform(-6.0, -1.0))),
+        "rotation": spin_about(draw, axis, rate, float(10.0 ** draw.uniform(-6.0, -1.0))),
     }
 
 
@@ -129,7 +129,7 @@ def middle_by_pose(draw: np.random.Generator, rate: float, _turn: float) -> Raw:
     }
     ranges = {f"R.a.{part}[{i + 1}]": [x, x] for part, values in port.items() for i, x in enumerate(values)}
     ranges[f"R.a.position[{axis + 1}]"] = [0.0, far]
-    rotation = _spin(draw, axis, rate, float(10.0 ** draw.uniform(-6.0, -1.0)))
+    rotation = spin_about(draw, axis, rate, float(10.0 ** draw.uniform(-6.0, -1.0)))
     del rotation["mass_change"]
     if draw.random() < 0.5:
         rotation["pose_change"] = "rate"
@@ -163,7 +163,7 @@ def middle_by_docks(draw: np.random.Generator, rate: float, _turn: float) -> Raw
         {"ports": [f"R.{n}", f"{n}.a"], "name": f"to{n}", "docked": bool(draw.random() < 0.5)} for n in names
     ]
     ranges = {f"to{n}.{key}": [0.0, 0.0] for n in names for key in ("velocity", "rate")}
-    rotation = _spin(draw, axis, rate, float(10.0 ** draw.uniform(-6.0, -1.0)))
+    rotation = spin_about(draw, axis, rate, float(10.0 ** draw.uniform(-6.0, -1.0)))
     del rotation["mass_change"]
     inputs = {"docked": [f"to{n}" for n in names], "range": ranges}
     return {"vessels": vessels, "docks": docks, "inputs": inputs, "rotation": rotation}
@@ -194,7 +194,7 @@ def nutating(draw: np.random.Generator, rate: float, _turn: float) -> Raw:
     pmi = across * (1.0 + float(10.0 ** draw.uniform(-8.0, -1.5)) * draw.random(3))
     pmi[axis] = across * float(draw.uniform(0.1, 1.9))
     tank = float(draw.choice([0.0, 10.0 ** draw.uniform(-3.0, -1.0)]))
-    return _one(draw, pmi, _spin(draw, axis, rate, float(10.0 ** draw.uniform(-4.0, -0.5))), tank=tank)
+    return _one(draw, pmi, spin_about(draw, axis, rate, float(10.0 ** draw.uniform(-4.0, -0.5))), tank=tank)
 
 
 def _moments(draw: np.random.Generator) -> Array:
@@ -210,7 +210,9 @@ def separatrix(draw: np.random.Generator, rate: float, _turn: float) -> Raw:
     one = np.sqrt(I[2] * (I[2] - I[1])) * middle
     other = np.sqrt(I[0] * (I[1] - I[0])) * middle * (1.0 + float(10.0 ** draw.uniform(-12.0, -2.0)))
     spin = np.array([one / I[2], 1.0, other / I[0]]) * draw.choice([-1.0, 1.0], size=3)
-    rotation = _spin(draw, 0, rate, 0.0) | {"angular_velocity": (rate * spin / np.linalg.norm(spin)).tolist()}
+    rotation = spin_about(draw, 0, rate, 0.0) | {
+        "angular_velocity": (rate * spin / np.linalg.norm(spin)).tolist()
+    }
     return _one(draw, I, rotation, tank=float(draw.choice([0.0, 10.0 ** draw.uniform(-4.0, -1.5)])))
 
 
@@ -220,7 +222,9 @@ def symmetric(draw: np.random.Generator, rate: float, _turn: float) -> Raw:
     pmi = form[int(draw.integers(1, 4)) if draw.random() < 0.7 else 0] + 0.0
     pmi = np.roll(pmi * float(10.0 ** draw.uniform(-1.0, 2.0)), int(draw.integers(3)))
     tank = 10.0 ** draw.uniform(-4.0, -0.5) if pmi.min() == 0.0 or draw.random() < 0.7 else 0.0
-    return _one(draw, pmi, _spin(draw, int(draw.integers(3)), rate, float(draw.random())), tank=float(tank))
+    return _one(
+        draw, pmi, spin_about(draw, int(draw.integers(3)), rate, float(draw.random())), tank=float(tank)
+    )
 
 
 def slender(draw: np.random.Generator, rate: float, _turn: float) -> Raw:
@@ -229,13 +233,13 @@ def slender(draw: np.random.Generator, rate: float, _turn: float) -> Raw:
     pmi = float(10.0 ** draw.uniform(0.0, 2.0)) * (1.0 - 0.3 * thin * draw.random(3))
     pmi[axis] *= thin
     tank = float(draw.choice([0.0, 10.0 ** draw.uniform(-5.0, -2.0)]))
-    return _one(draw, pmi, _spin(draw, int(draw.integers(3)), rate, float(draw.random())), tank=tank)
+    return _one(draw, pmi, spin_about(draw, int(draw.integers(3)), rate, float(draw.random())), tank=tank)
 
 
 def one_sided(draw: np.random.Generator, _rate: float, _turn: float) -> Raw:
     """A body at rest whose torque has one sign."""
     tank = float(draw.choice([0.0, 10.0 ** draw.uniform(-3.0, -0.5)]))
-    raw = _one(draw, draw.permutation(_moments(draw)), _spin(draw, 0, 0.0, 0.0), tank=tank)
+    raw = _one(draw, draw.permutation(_moments(draw)), spin_about(draw, 0, 0.0, 0.0), tank=tank)
     below = bool(draw.random() < 0.5)
     raw["inputs"]["push"] = float(10.0 ** draw.uniform(0.0, 1.0))
     raw["inputs"]["sided"] = lambda size: [-size, 0.0] if below else [0.0, size]
@@ -244,7 +248,7 @@ def one_sided(draw: np.random.Generator, _rate: float, _turn: float) -> Raw:
 
 def pumped(draw: np.random.Generator, rate: float, _turn: float) -> Raw:
     """Masses and torque that together, in phase, spin a body up; both masses wide, none in the middle."""
-    raw = _chain(draw, 2)
+    raw = chain(draw, 2)
     raw["inputs"] = {
         "mass": ["R", "V1"],
         "torque": True,
@@ -254,11 +258,11 @@ def pumped(draw: np.random.Generator, rate: float, _turn: float) -> Raw:
     for name in ("R", "V1"):
         mass = raw["vessels"][name]["mass"]
         raw["inputs"]["range"][f"{name}.mass"] = [float(draw.uniform(0.05, 0.5)) * mass, mass]
-    raw["rotation"] = _spin(draw, int(draw.integers(3)), rate, float(draw.random()))
+    raw["rotation"] = spin_about(draw, int(draw.integers(3)), rate, float(draw.random()))
     return raw
 
 
-def _chain(draw: np.random.Generator, count: int) -> Raw:
+def chain(draw: np.random.Generator, count: int) -> Raw:
     """Returns vessels in a chain, docked at random."""
     names = ["R", *(f"V{i}" for i in range(1, count))]
     vessels: Raw = {}
@@ -279,7 +283,7 @@ def _chain(draw: np.random.Generator, count: int) -> Raw:
 
 def ordinary(draw: np.random.Generator, rate: float, turn: float) -> Raw:
     """One to three vessels of which some masses, moments, poses, docks, a force or a torque vary."""
-    raw = _chain(draw, int(draw.integers(1, 4)))
+    raw = chain(draw, int(draw.integers(1, 4)))
     vessels, names = raw["vessels"], list(raw["vessels"])
     some = [name for name in names if draw.random() < 0.5]
     inputs: Raw = {"mass": some, "range": {}, "torque": bool(draw.random() < 0.7)}
@@ -300,7 +304,7 @@ def ordinary(draw: np.random.Generator, rate: float, turn: float) -> Raw:
         moment = vessels["R"]["mass"] * max(vessels["R"]["pmi"])
         arm = float(np.linalg.norm(vessels["R"]["points"]["jet"]["position"]))
         inputs["range"]["R.jet.force"] = [0.0, 0.1 * moment * rate * rate / turn / arm]
-    raw["rotation"] = _spin(draw, 0, rate, 10.0)
+    raw["rotation"] = spin_about(draw, 0, rate, 10.0)
     if raw["docks"] and draw.random() < 0.2:
         inputs["pose"] = ["R.aft"]
         for part, values in vessels["R"]["ports"]["aft"].items():
