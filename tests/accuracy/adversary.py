@@ -161,12 +161,17 @@ def examined(number: int, *, rules: bool = True) -> Record:
 
 
 def attacked(raw: Raw, seed: int, folder: Path, *, rules: bool = True) -> Record:
-    """Returns what came of a raw scene, see `examined`. All numbers are SI, angles [rad]."""
+    """Returns what came of a raw scene, see `examined`. All numbers are SI, angles [rad].
+
+    A scene is refused where nothing that is as exact as it asks can be had; any other BuildError goes on.
+    """
     begun, scene = _seconds(), parse_scene(raw)
     with both_rules() if rules else _nothing() as seen:
         try:
             fmu = build_fmu(scene, folder / f"{scene.name}.fmu")
         except BuildError as error:
+            if not str(error).startswith(f"{scene.name}: accuracy"):
+                raise
             return {"code": code(), "refused": str(error), "seconds": _seconds() - begun}
     with zipfile.ZipFile(fmu) as archive:
         evidence = json.loads(archive.read("resources/accuracy.json"))

@@ -259,6 +259,7 @@ def pumped(draw: np.random.Generator, rate: float, _turn: float) -> Raw:
         mass = raw["vessels"][name]["mass"]
         raw["inputs"]["range"][f"{name}.mass"] = [float(draw.uniform(0.05, 0.5)) * mass, mass]
     raw["rotation"] = spin_about(draw, int(draw.integers(3)), rate, float(draw.random()))
+    raw["rotation"]["mass_change"] = str(draw.choice(["rate", "momentum"]))
     return raw
 
 

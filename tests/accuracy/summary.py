@@ -92,6 +92,7 @@ def report(records: Sequence[Record]) -> str:
         *_old_rule(built),
         *_of_output(built),
         *(line for one in built for line in breaches(one)),
+        *(f"refused: {one['refused'][:160]}" for one in records if one["refused"] is not None),
     ]
     return "\n".join(lines)
 

@@ -11,7 +11,10 @@ from accuracy import summary
 from accuracy.adversary import examine, judged, known_to, recorded, true_flights
 from accuracy.attacks import Attack, Ranges, attacks, growing, periods
 from accuracy.nasty_scenes import NASTY, scene_of
+from accuracy.square_waves import FASTER, KNOWN, errors, growths, used, waved_scene
 from accuracy.truth import after_a_step
+from fmu_build.accuracy.search import MARGIN
+from fmu_build.flight.choices import BEST, Choice
 from supervessel import parse_scene
 
 HANDFUL = (1, 7)
@@ -196,3 +199,36 @@ def test_claims_of_many_nasty_scenes_hold(
     assert len(slow) >= 0.4 * len(built)
     proven = [one for one in slow if summary.grade(one) != summary.FLOWN]
     assert len(proven) >= summary.PROVEN_OF_SLOW * len(slow) - 1
+
+
+def asked_in_the_known_case() -> dict[str, Any]:
+    raw = waved_scene(KNOWN)
+    raw["accuracy"]["attitude"] = 8.3e-6
+    return raw
+
+
+def test_square_waves_of_five_steps_show_what_no_other_history_of_a_choice_does() -> None:
+    """The known case: `dop853` at 1e-9 keeps 8.3e-6 rad with the margin of 5, but in waves of all inputs."""
+    scene = parse_scene(asked_in_the_known_case())
+    assert scene.accuracy is not None
+    found = errors(scene, Choice(BEST, "dop853", None, 1e-9))
+    waves = {name: error for name, error in found.items() if name.startswith("all to and fro")}
+    rest = {name: error for name, error in found.items() if "to and fro" not in name}
+    print(max(rest.items(), key=lambda one: one[1]), waves)
+    assert MARGIN * max(rest.values()) <= scene.accuracy.attitude
+    assert waves["all to and fro every 5 steps"] > 2.0 * scene.accuracy.attitude
+
+
+def test_errors_grow_along_square_waves_as_along_no_other_history() -> None:
+    """Where masses keep the momentum."""
+    other, waves = growths(parse_scene(waved_scene(1)), 1)
+    assert waves > FASTER * other
+
+
+@pytest.mark.accuracy
+def test_a_choice_without_square_waves_is_broken_by_them(capsys: pytest.CaptureFixture[str]) -> None:
+    """The known case, chosen with the choice's own square waves and without."""
+    results = {waves: used(asked_in_the_known_case(), KNOWN, waves=waves) for waves in (False, True)}
+    with capsys.disabled():
+        print(f"\nwithout square waves {results[False]}; with them {results[True]}")
+    assert results[True][1] <= 1.0
