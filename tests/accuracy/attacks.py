@@ -186,8 +186,8 @@ def _waves(
     every, none = np.ones_like(acting), np.zeros_like(acting)
     if acting.any():
         yield Attack("torque with the nutation", wave(nutation, acting, none))
-    yield Attack("all with the nutation", wave(nutation, every, none))
     if not acting.all():
+        yield Attack("all with the nutation", wave(nutation, every, none))
         yield Attack("all with half the nutation's period", wave(0.5 * nutation, every, none))
         yield Attack("all with the turn, what acts a quarter later", wave(turn, every, acting))
 
