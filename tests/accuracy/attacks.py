@@ -188,7 +188,6 @@ def _waves(
         yield Attack("torque with the nutation", wave(nutation, acting, none))
     if not acting.all():
         yield Attack("all with the nutation", wave(nutation, every, none))
-        yield Attack("all with half the nutation's period", wave(0.5 * nutation, every, none))
         yield Attack("all with the turn, what acts a quarter later", wave(turn, every, acting))
 
 
