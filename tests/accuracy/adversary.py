@@ -1,6 +1,6 @@
 """Claims of `[accuracy]`, attacked: nasty random scenes, histories made against them, an independent truth.
 
-    cd tests && ../.venv/bin/python -m accuracy.adversary --scenes 0:500
+    PYTHONPATH=tests .venv/bin/python -m accuracy.adversary --scenes 0:500
 
 examines scenes by number, appends what came of each to a file of JSON lines, and prints a summary of it.
 Scenes that are in it, of the same code, are left out: parts add up.

@@ -3,7 +3,7 @@
 Once a method was chosen for 8.3e-6 rad under the law tensor, and square waves of mass and all torques
 together, five steps each, gave 1.29e-4 rad. Here is a search for scenes of that kind:
 
-    cd tests && ../.venv/bin/python -m accuracy.square_waves --scenes 0:100
+    PYTHONPATH=tests .venv/bin/python -m accuracy.square_waves --scenes 0:100
 
 In the first place small errors are followed along all histories of a choice, and along square waves; where
 the waves let errors grow much more the choice is made, and its FMU flown, with the choice's own square waves
