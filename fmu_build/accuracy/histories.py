@@ -13,6 +13,7 @@ from random import Random
 import numpy as np
 from numpy.typing import NDArray
 
+from fmu_build.accuracy.waves import Ends, waves_that_grow
 from fmu_build.flight.experiment import Course, course_of
 from fmu_build.flight.flying import InputCourses
 from supervessel.composite.resolved import resolve
@@ -62,6 +63,9 @@ WAVES = 3
 
 TOGETHER = (3, 5, 12, 50, 200)
 """Communication steps after which everything jumps to the other end of its range, and back."""
+
+SHAKEN, SHAKEN_CORNERS = 3, 12
+"""Square waves that are flown because errors grow along them, and the corners among which they are found."""
 
 MOST_COMBINATIONS = 64
 """Combinations of docks that are held one by one, at most."""
@@ -174,6 +178,7 @@ def histories(scene: Scene, accuracy: Accuracy, judge: Judge, body: Body) -> His
             if len(rows):
                 flown.append(History(f"one input at a time {i}", columns.inputs(times, rows[: len(times)])))
         flown += _together(columns, course, corners, judge)
+        flown += _shaken(columns, course, scene, corners, judge, body)
         flown += _growing(columns, scene, random, np.concatenate([corners, inside[fits[2]]]), judge, body)
         if columns.acting.any():
             starts = (columns.start, *_easiest(columns, corners[:SPUN], body))
@@ -266,10 +271,7 @@ def _easiest(columns: _Columns, corners: Array, body: Body) -> list[Array]:
 
 def _together(columns: _Columns, course: Course, corners: Array, judge: Judge) -> Iterator[History]:
     """Yields histories in which everything jumps to the opposite corner and back, if both make sense."""
-    here = corners[:SPUN]
-    there = np.where(here == columns.low, columns.high, columns.low)
-    fits = judge(columns.inputs(np.arange(len(here)), there)) if len(here) else np.zeros(0, dtype=bool)
-    here, there = here[fits], there[fits]
+    here, there = _opposite(columns, corners, judge)
     stride = ceil(course.steps * len(columns.low) / MOST_NUMBERS)
     for i, half in enumerate(TOGETHER if len(here) else ()):
         rows = np.arange(0, course.steps, max(half, stride))
@@ -277,6 +279,51 @@ def _together(columns: _Columns, course: Course, corners: Array, judge: Judge) -
             ends = here[i % len(here)], there[i % len(here)]
             values = np.where((np.arange(len(rows)) % 2 == 0)[:, None], *ends)
             yield History(f"all to and fro every {half} steps", columns.inputs(rows, values))
+
+
+def _opposite(columns: _Columns, corners: Array, judge: Judge) -> tuple[Array, Array]:
+    """Returns corners and their opposite ones, where both make sense."""
+    here = corners[:SPUN]
+    there = np.where(here == columns.low, columns.high, columns.low)
+    fits = judge(columns.inputs(np.arange(len(here)), there)) if len(here) else np.zeros(0, dtype=bool)
+    return here[fits], there[fits]
+
+
+def _shaken(  # noqa: PLR0913, PLR0917
+    columns: _Columns, course: Course, scene: Scene, corners: Array, judge: Judge, body: Body
+) -> Iterator[History]:
+    """Yields the square waves of all inputs along which small errors grow most, each of other corners."""
+    here, there = _opposite(columns, corners, judge)
+    ends = [_ends(columns, pair, body) for pair in zip(here[:SHAKEN_CORNERS], there, strict=False)]
+    sound = [i for i, one in enumerate(ends) if one is not None]
+    rate, momentum = np.array(scene.rotation.angular_velocity), "momentum" in scene.keeps.values()
+    known = [one for one in ends if one is not None]
+    waves = waves_that_grow(known, rate, course.size, course.steps, momentum=momentum)
+    if course.steps * len(columns.low) > MOST_NUMBERS:
+        return
+    seen: set[int] = set()
+    for wave in waves:
+        if wave.ends in seen or len(seen) == SHAKEN:
+            continue
+        seen.add(wave.ends)
+        first = wave.at_first(course.steps)
+        rows = np.flatnonzero(np.diff(first, prepend=~first[0]))
+        pair = here[sound[wave.ends]], there[sound[wave.ends]]
+        values = np.where(first[rows][:, None], *pair)
+        name = (
+            f"to and fro every {wave.half} and {wave.other} steps from corner {wave.ends + 1}, as errors grow"
+        )
+        yield History(name, columns.inputs(rows, values))
+
+
+def _ends(columns: _Columns, pair: tuple[Array, Array], body: Body) -> Ends | None:
+    """Returns the body at both ends of a wave; None where it cannot be turned."""
+    split = len(columns.numbers)
+    found = [(*body(row[:split], row[split:]), row[columns.acting]) for row in pair]
+    inertia = np.array([J for J, _, _ in found])
+    if not np.all(np.isfinite(inertia)) or np.linalg.eigvalsh(inertia).min() <= 0.0:
+        return None
+    return Ends(inertia, np.array([gains @ acts if len(acts) else np.zeros(3) for _, gains, acts in found]))
 
 
 def _growing(  # noqa: PLR0913, PLR0917
@@ -296,6 +343,7 @@ def _growing(  # noqa: PLR0913, PLR0917
         linear = np.column_stack([np.cross(J @ rate, d) - np.cross(rate, J @ d) for d in np.eye(3)])
         return float(f"{np.linalg.eigvals(np.linalg.solve(J, linear)).real.max():.6g}")
 
+    rows = rows[np.sort(np.unique(np.where(columns.acting, 0.0, rows), axis=0, return_index=True)[1])]
     found = [growth(row) for row in rows]
     if not found or max(found) <= 0.0:
         return

@@ -6,7 +6,7 @@ does not alter it, so that inputs may jump at every communication step.
 Derivation: [EB] eqs. (29) to (42), model/docs/error_bound.md.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import ceil, exp, inf, isfinite, pi, sqrt
 
@@ -153,31 +153,50 @@ def _refusal(resolved: ResolvedScene, ranges: Bounds) -> str:
     return ""
 
 
-def _boxes(found: RangeSuprema, spans: Array) -> list[tuple[Array, Array]]:
+Sources = Callable[[tuple[Array, Array]], tuple[float, float, float]]
+"""What steps of a method add where y is in a box, over their length: angle [rad/s], rate [J^(1/2)/s], and to
+each element of y."""
+
+
+def _nothing(_box: tuple[Array, Array]) -> tuple[float, float, float]:
+    return 0.0, 0.0, 0.0
+
+
+def _boxes(found: RangeSuprema, spans: Array, step: float, sources: Sources) -> list[tuple[Array, Array]]:
     """Returns boxes, (3,) and (3,), that hold y, rate or momentum of the law, over each span.
 
-    A box that holds what y may reach from the box before, at the fastest change inside it, holds y; so does
-    what its length allows. They are infinite where none is found. [EB] eqs. (33), (35).
+    A box that holds what y may reach from the box before, at the fastest change inside it and with what steps
+    add there, one more than fit in, holds y; so does what its length allows. They are infinite where none is
+    found. [EB] eqs. (33), (35).
     """
     low, high = found.start
     middle = float(np.linalg.norm(found.own.T @ (0.5 * (low + high))))
     energy = (middle + float(np.linalg.norm(np.abs(found.own.T) @ (0.5 * (high - low))))) * SLACK
     shares = np.linalg.norm(np.linalg.inv(found.own), axis=0) * SLACK
-    boxes = []
+    heaviest = float(np.linalg.norm(found.own)) * sqrt(3.0) * SLACK
+    nowhere = np.full(3, -inf), np.full(3, inf)
+    boxes: list[tuple[Array, Array]] = []
     for span in spans:
         energy = _energy_after(found, energy, float(span))
-        cap = energy * shares
         inner, outer = low, high
         for _ in range(60):
-            change = span * found.cheap.fastest(np.maximum(np.abs(inner), np.abs(outer))) * SLACK
+            by_steps = (float(span) + step) * sources((inner, outer))[2] * SLACK
+            if not isfinite(by_steps):
+                return boxes + [nowhere] * (len(spans) - len(boxes))
+            cap = (energy + heaviest * by_steps) * shares
+            change = span * found.cheap.fastest(np.maximum(np.abs(inner), np.abs(outer))) * SLACK + by_steps
             wanted = np.maximum(low - change, -cap), np.minimum(high + change, cap)
             if np.all(wanted[0] >= inner) and np.all(wanted[1] <= outer):
                 break
             inner = np.maximum(low - 1.05 * change, -cap)
             outer = np.minimum(high + 1.05 * change, cap)
         else:
-            inner, outer = wanted = -cap, cap
+            inner, outer = wanted = -1.05 * cap, 1.05 * cap
+            by_steps = (float(span) + step) * sources(wanted)[2] * SLACK
+            if not np.all((energy + heaviest * by_steps) * shares <= outer):
+                return boxes + [nowhere] * (len(spans) - len(boxes))
         boxes.append((inner, outer))
+        energy += heaviest * by_steps
         low, high = wanted
     return boxes
 
@@ -194,40 +213,71 @@ def _energy_after(found: RangeSuprema, energy: float, span: float) -> float:
 
 
 def _flown(scene: Scene, found: RangeSuprema, times: Array, step: float) -> ProvenBound:
-    """Returns the bound along the flight, of parts over which growth and residual are at their largest."""
+    """Returns the bound along the flight, of the law's exact motion and of a method's steps."""
+    method = _method(scene)
+
+    def sources(box: tuple[Array, Array]) -> tuple[float, float, float]:
+        return _method_sources(scene, found, box, step, method)
+
+    law, whole = (_along(scene, found, (times, step), each) for each in (_nothing, sources))
+    why = ""
+    if not isfinite(law.angles[-1]):
+        why = "growth: errors may grow beyond any bound in the ranges"
+    elif not isfinite(whole.angles[-1]):
+        why = f"method: steps of {step:g} s turn too far for the remainder"
+    return ProvenBound(
+        times, law.angles, law.rates, whole.angles, whole.rates, method, law.growth, law.residual, why
+    )
+
+
+@dataclass(frozen=True)
+class _Along:
+    """A bound at communication points, (n,) [rad] and [rad/s], and its largest growth and residual."""
+
+    angles: Array
+    rates: Array
+    growth: float
+    residual: float
+
+
+def _along(scene: Scene, found: RangeSuprema, at: tuple[Array, float], sources: Sources) -> _Along:
+    """Returns the bound along a flight, of parts over which growth and residual are at their largest.
+
+    at : times [s] of communication points, and the step [s]
+    """
+    times, step = at
     duration = float(times[-1])
     ends = np.unique(times[np.unique(np.linspace(0, len(times) - 1, SEGMENTS + 1).astype(int))])
     if len(times) == 1:
         ends = np.linspace(0.0, duration, SEGMENTS + 1)[1:]
     spans = np.diff(np.append(0.0, ends))
-    boxes, method = _boxes(found, spans), _method(scene)
-    law = whole = _Carried(found.rate_share, energy=found.begun)
-    of_law, law_rate, of_all, rate = (np.full(len(times), inf) for _ in range(4))
+    carried = _Carried(found.rate_share, energy=found.begun)
+    angles, rates = (np.full(len(times), inf) for _ in range(2))
     begun, most = 0.0, [0.0, 0.0]
-    for end, span, (low, high) in zip(ends, spans, boxes, strict=True):
-        if not np.isfinite(low).all():
+    for end, span, box in zip(ends, spans, _boxes(found, spans, step, sources), strict=True):
+        if not np.isfinite(box).all():
             most = [inf, inf]
             break
-        growth = growth_over(found, low, high)
-        residual = 0.0 if scene.rotation.law == "tensor" else residual_over(found, low, high)
-        off = off_over(found, low, high)
+        growth = growth_over(found, *box)
+        residual = 0.0 if scene.rotation.law == "tensor" else residual_over(found, *box)
+        off = off_over(found, *box)
         most = [max(most[0], growth), max(most[1], residual)]
-        added = _method_sources(scene, found, (low, high), step, method)
-        inside = np.flatnonzero((times > begun + 1e-9 * step) & (times <= end * (1 + 1e-12)))
-        for i in inside:
-            there = law.after(times[i] - begun, growth, found.cubic, residual, off)
-            of_law[i], law_rate[i] = there.angle, there.rate_share * there.energy + off
-            there = whole.after(times[i] - begun, growth, found.cubic, residual + added[1], off + added[0])
-            of_all[i], rate[i] = there.angle, there.rate_share * there.energy + off
-        law = law.after(span, growth, found.cubic, residual, off)
-        whole = whole.after(span, growth, found.cubic, residual + added[1], off + added[0])
-        begun = float(end)
-    why = ""
-    if not isfinite(of_law[-1]):
-        why = "growth: errors may grow beyond any bound in the ranges"
-    elif not isfinite(of_all[-1]):
-        why = f"method: steps of {step:g} s turn too far for the remainder"
-    return ProvenBound(times, of_law, law_rate, of_all, rate, method, most[0], most[1], why)
+        added = sources(box)
+
+        def after(
+            span: float,
+            so_far: _Carried = carried,
+            by_law: tuple[float, float, float] = (growth, residual, off),
+            added: tuple[float, float, float] = added,
+        ) -> _Carried:
+            growth, residual, off = by_law
+            return so_far.after(span, growth, found.cubic, residual + added[1], off + added[0])
+
+        for i in np.flatnonzero((times > begun + 1e-9 * step) & (times <= end * (1 + 1e-12))):
+            there = after(times[i] - begun)
+            angles[i], rates[i] = there.angle, there.rate_share * there.energy + off
+        carried, begun = after(span), float(end)
+    return _Along(angles, rates, *most)
 
 
 @dataclass(frozen=True)
@@ -263,8 +313,8 @@ def _method(scene: Scene) -> str:
 
 def _method_sources(
     scene: Scene, found: RangeSuprema, box: tuple[Array, Array], step: float, method: str
-) -> tuple[float, float]:
-    """Returns what steps add, over their length: angle [rad/s], rate [J^(1/2)/s].
+) -> tuple[float, float, float]:
+    """Returns what steps add, see `Sources`; to y nothing where it is only estimated.
 
     What rk4 leaves out is that of a single sub-step: smaller ones leave out less. Its rounding is of all.
     Of other methods each communication step adds the tolerance.
@@ -273,14 +323,14 @@ def _method_sources(
     speed = float(np.linalg.norm(rates))
     if method == "estimate":
         tolerance = scene.rotation.tolerance
-        return tolerance / step, tolerance * speed * found.heaviest / step
+        return tolerance / step, tolerance * speed * found.heaviest / step, 0.0
     constants = remainder_of("rk4")
     coupling = max(found.law.coupling, LEAST_COUPLING)
     spin = float(np.linalg.norm(found.law.turn))
     v = speed + max(sqrt(float(np.linalg.norm(found.law.push)) / coupling), 0.5 * spin / coupling)
     z = coupling * v * step
     if z > constants.limit:
-        return inf, inf
+        return inf, inf, inf
     power = float(z**constants.power)
     fastest = float(np.linalg.norm(found.law.fastest(rates)))
     sub_steps = _most_sub_steps(scene.rotation.max_angle_step, step, speed, fastest, found.spin_rate)
@@ -292,7 +342,8 @@ def _method_sources(
         + 0.5 * EPSILON * (8.0 * sub_steps + DEPTH * step * speed)
         + 0.5 * step * rate
     )
-    return turn / step * SLACK, found.heaviest * rate / step * SLACK
+    of_rate = rate / step * SLACK
+    return turn / step * SLACK, found.heaviest * of_rate, found.stretch * of_rate
 
 
 def _most_sub_steps(angle: float, step: float, speed: float, fastest: float, spin_rate: float) -> int:

@@ -96,6 +96,7 @@ class RangeSuprema:
     off          : difference of rates beside it
     rate         : the law's rate
     heaviest     : largest error in the norm of K by an error of the law's rate
+    stretch      : largest change of y by an error of the law's rate: 1, or the law's tensor [kg m2]
     change_speed : rounding of a change of inputs, over u and roundings: by the rate [1]; [EB] eq. (42)
     change_spin  : and by the spin of moving parts [rad/s]
     spin_rate    : largest |h| trace(J^-1) [rad/s]
@@ -118,6 +119,7 @@ class RangeSuprema:
     off: Affine
     rate: Affine
     heaviest: float
+    stretch: float
     change_speed: float
     change_spin: float
     spin_rate: float
@@ -169,13 +171,20 @@ def range_suprema(resolved: ResolvedScene, ranges: Bounds, kept: Kept) -> RangeS
     else:
         compared = rates_compared(law, body, middle, start)
     found = _over_boxes(compared, graph.p, (low, high))
-    return None if found is None else _suprema(compared, found, resolved, ranges)
+    return None if found is None else _suprema(compared, found, resolved, (kept, ranges))
 
 
 def _suprema(
-    compared: Compared, found: Mapping[str, Interval], resolved: ResolvedScene, ranges: Bounds
+    compared: Compared,
+    found: Mapping[str, Interval],
+    resolved: ResolvedScene,
+    changes: tuple[Kept, Bounds],
 ) -> RangeSuprema:
-    """Returns suprema of what `_over_boxes` has found; its first box, the start's values, is among them."""
+    """Returns suprema of what `_over_boxes` has found; its first box, the start's values, is among them.
+
+    changes : what changes keep, and the ranges
+    """
+    kept, ranges = changes
     acting = [ranges[v.name] for v in resolved.acting]
     sizes = np.array([max(abs(a), abs(b)) for a, b in acting], dtype=float)
     D, h, inverse = (_frobenius(found[name]) for name in ("kept_tensor", "kept_spin", "kept_inverse"))
@@ -198,6 +207,7 @@ def _suprema(
         off=_affine(found, "off"),
         rate=_affine(found, "rate"),
         heaviest=SLACK * _frobenius(found["by_rate"]),
+        stretch=SLACK * D if kept == "momentum" else 1.0,
         change_speed=6.0 * SLACK * inverse * D,
         change_spin=2.0 * SLACK * inverse * h,
         spin_rate=_frobenius(found["spin_rate"]),

@@ -100,7 +100,7 @@ def square_waves(scene: Scene, seed: int) -> list[Attack]:
 @contextmanager
 def no_waves() -> Iterator[None]:
     """Has a choice fly no square waves, of all inputs or of what acts."""
-    with mock.patch.object(histories, "TOGETHER", ()), mock.patch.object(histories, "WAVES", 0):
+    with mock.patch.multiple(histories, TOGETHER=(), WAVES=0, SHAKEN=0):
         yield
 
 
