@@ -185,7 +185,6 @@ Status composite_refresh(Instance *instance) {
     if (status != STATUS_OK) return status;
     now->composite_is_current = true;
     now->composite_is_ordinary = are_all_within(now->p, now->c, ORDINARY);
-    if (ERROR_BOUND) now->composite_is_tame = are_all_within(now->p, now->c, TAME);
     now->axes_are_current = false;
     instance->outputs_are_current = instance->rates_are_current = false;
     instance_inform(instance, LOG_COMPOSITE, "composite computed at %.10g s: mass = %.10g kg",
@@ -198,7 +197,8 @@ void composite_refresh_axes(Instance *instance) {
 #if AXES_COUNT
     instance->arg[0] = instance->now.c;
     instance->res[0] = instance->now.a;
-    axes(instance->arg, instance->res, instance->iw, instance->w, 0);
+    /* what the bound of the error needs leaves the range of doubles before moments and axes do */
+    instance_call(instance, axes, !ERROR_BOUND || instance->now.composite_is_ordinary);
 #endif
     instance->now.axes_are_current = true;
     instance->outputs_are_current = false;

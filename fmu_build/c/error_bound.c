@@ -11,6 +11,7 @@
 #include "composite.h"
 #include "docks.h"
 #include "model.h"
+#include "variables.h"
 
 static const double PI = 3.14159265358979323846;
 
@@ -39,6 +40,7 @@ void bound_remember(Instance *instance) {
     Dynamics *now = &instance->now;
     memcpy(now->bound_from.rate, instance_x(instance) + 4, sizeof now->bound_from.rate);
     memcpy(now->bound_from.c, now->c, sizeof now->c);
+    memcpy(now->bound_from.p, now->p, sizeof now->p);
 }
 
 void bound_start(Instance *instance) {
@@ -55,7 +57,7 @@ static void keep_both_rates(Instance *instance, const double c[], const double d
     instance->arg[1] = c;
     instance->arg[2] = d;
     instance->res[0] = &after;
-    instance_call(instance, bound_kept_rate, instance->now.composite_is_tame);
+    bound_kept_rate(instance->arg, instance->res, instance->iw, instance->w, 0);
     *energy = after;
 }
 
@@ -69,7 +71,7 @@ static void keep_true_momentum(Instance *instance, const double c[], const doubl
     instance->arg[3] = rate;
     instance->arg[4] = turned;
     instance->res[0] = &after;
-    instance_call(instance, bound_kept_momentum, instance->now.composite_is_tame);
+    bound_kept_momentum(instance->arg, instance->res, instance->iw, instance->w, 0);
     *energy = after;
 }
 
@@ -117,7 +119,7 @@ static bool follow_stages(Instance *instance, double c[]) {
     Stage stage;
     double rate[3];
     memcpy(rate, instance->now.bound_from.rate, sizeof rate);
-    first_stage(&stage, instance->now.stepped_p, c, instance->now.p);
+    first_stage(&stage, instance->now.bound_from.p, c, instance->now.p);
     if (BOUND_MASSES_KEEP_MOMENTUM) {
         if (!keep_while(instance, &stage, KIND_MASS, rate, c)) return false;
     } else
@@ -141,7 +143,7 @@ static bool closes_unseen(const Instance *instance) {
     const Dynamics *now = &instance->now;
     for (size_t i = 0; i < DOCK_COUNT; i++) {
         const Dock *dock = &DOCKS[i];
-        if (dock->flag < 0 || now->p[dock->flag] == 0.0 || now->stepped_p[dock->flag] != 0.0) continue;
+        if (dock->flag < 0 || now->p[dock->flag] == 0.0 || now->bound_from.p[dock->flag] != 0.0) continue;
         const double *motion = &now->values[REFERENCE_CONTACT + dock->motion];
         for (size_t k = 0; k < 6; k++) unseen = unseen || motion[k] != 0.0;
     }
@@ -151,17 +153,25 @@ static bool closes_unseen(const Instance *instance) {
     return unseen;
 }
 
-void bound_over_change(Instance *instance) {
-    Dynamics *now = &instance->now;
-    if (says_nothing(now) || memcmp(now->p, now->stepped_p, INPUT_P_COUNT * sizeof(double)) == 0) return;
+/* Takes the energy norm over a change. Returns false where nothing is known of it any more. */
+static bool follow_change(Instance *instance) {
     double c[COMPOSITE_COUNT];
-    memcpy(c, now->bound_from.c, sizeof c);
-    if (!has_inertia(now->c) || !has_inertia(c) || closes_unseen(instance) || !follow_stages(instance, c)) {
-        lose(instance);
-        return;
-    }
-    keep_both_rates(instance, c, now->c);
-    if (!(now->bound[ENERGY] <= DBL_MAX)) lose(instance);
+    memcpy(c, instance->now.bound_from.c, sizeof c);
+    if (!has_inertia(instance->now.c) || !has_inertia(c) || closes_unseen(instance)) return false;
+    if (!follow_stages(instance, c)) return false;
+    keep_both_rates(instance, c, instance->now.c);
+    return isfinite(instance->now.bound[ENERGY]);
+}
+
+/* Composites on the way of a change are judged by nobody else: the importer is to see no flag that they raise. */
+void bound_over_change(Instance *instance) {
+    const Dynamics *now = &instance->now;
+    if (says_nothing(now) || memcmp(now->p, now->bound_from.p, INPUT_P_COUNT * sizeof(double)) == 0) return;
+    fenv_t importers;
+    feholdexcept(&importers);
+    const bool known = follow_change(instance);
+    fesetenv(&importers);
+    if (!known) lose(instance);
 }
 
 /* Logs, once, that the bound has passed what the scene asks for. */
@@ -182,34 +192,29 @@ static void tell(Instance *instance) {
 #endif
 }
 
-static double size_of(const double numbers[], size_t count) {
-    double size = 0.0;
-    for (size_t i = 0; i < count; i++) size += fabs(numbers[i]);
-    return size;
-}
-
-void bound_over_sub_step(Instance *instance, const double x[], double size, const Progress *progress) {
+/* Takes the bound over a sub-step. Returns false where nothing is known any more: also where numbers are so far from 1
+   that what the bound is made of may be no doubles. The largest of them and an exponential may be none anywhere, so
+   that the importer's flags are kept from all of it. */
+static bool carry(Instance *instance, const double x[], double size, const Progress *progress) {
     Dynamics *now = &instance->now;
-    if (!has_inertia(now->c)) lose(instance);
-    if (says_nothing(now)) {
-        tell(instance);
-        return;
-    }
+    if (!has_inertia(now->c) || !instance_is_ordinary(instance) || !are_within(x, STATE_COUNT, ORDINARY)) return false;
     composite_refresh_axes(instance);
-    const double s[4] = {size, progress->was_free ? 0.0 : progress->exponent, progress->found[0], progress->found[1]};
+    const double power = progress->was_free ? 0.0 : progress->exponent;
+    const double s[4] = {size, power, progress->found[0], progress->found[1]};
     double after[3];
-    const double sizes = size_of(x + 4, 3) + size_of(s, 4) + size_of(now->bound, 3) +
-                         size_of(&now->values[REFERENCE_TORQUE], INPUT_U_COUNT);
     instance_set_arguments(instance);
     instance->arg[0] = x;
     instance->arg[4] = s;
     instance->arg[5] = now->bound;
     instance->res[0] = after;
-    instance_call(instance, bound_step, now->composite_is_tame && sizes <= TAME);
-    if (after[ANGLE] < PI && after[ENERGY] <= DBL_MAX && after[RATE] <= DBL_MAX) {
-        memcpy(now->bound, after, sizeof after);
-        now->errors[BOUND] = after[ANGLE];
-    } else
-        lose(instance);
+    instance_call(instance, bound_step, false);
+    if (!isless(after[ANGLE], PI) || !isfinite(after[ENERGY]) || !isfinite(after[RATE])) return false;
+    memcpy(now->bound, after, sizeof after);
+    now->errors[BOUND] = after[ANGLE];
+    return true;
+}
+
+void bound_over_sub_step(Instance *instance, const double x[], double size, const Progress *progress) {
+    if (!says_nothing(&instance->now) && !carry(instance, x, size, progress)) lose(instance);
     tell(instance);
 }

@@ -105,8 +105,8 @@ typedef struct {
     double errors[2];                 /* rad: the estimate of the last communication step; the bound since the start */
     double bound[ERROR_BOUND ? 3 : 1]; /* of the angle, rad; of the rate in the energy norm, J^(1/2); of the rate, rad/s */
     struct {
-        double rate[ERROR_BOUND ? 3 : 1], c[ERROR_BOUND ? COMPOSITE_COUNT : 1];
-    } bound_from;                     /* rate and composite that a change of inputs begins from, with stepped_p */
+        double rate[ERROR_BOUND ? 3 : 1], c[ERROR_BOUND ? COMPOSITE_COUNT : 1], p[ERROR_BOUND ? INPUT_P_COUNT + 1 : 1];
+    } bound_from;                     /* rate, composite and inputs that the bound's next change begins from */
     double x[STATE_IS_MOMENTUM ? STATE_COUNT : 1]; /* attitude and angular velocity; the states hold the momentum */
     double kept_momentum[STATE_IS_MOMENTUM ? 3 : 1]; /* N.m.s, of the states when changes were committed last */
     double kept_rate[CHANGES ? 3 : 1]; /* rad/s, that a change of inputs began from, with stepped_p */
@@ -124,7 +124,6 @@ typedef struct {
     unsigned stop_time_defined;
     unsigned composite_is_current;    /* p and c follow from the inputs as they are */
     unsigned composite_is_ordinary;   /* products of a few numbers of p and c are doubles */
-    unsigned composite_is_tame;       /* so are those of a dozen */
     unsigned axes_are_current;        /* a follows from c */
     unsigned epoch_holds;             /* the motion has been free since epoch, with stepped_p */
     unsigned epoch_step;              /* an EpochStep */

@@ -1,7 +1,9 @@
-/* No change of inputs changes the rate: of what changes.h declares nothing is left to do but to keep p and c. */
+/* No change of inputs changes the rate: of what changes.h declares nothing is left to do but to keep p and c. The motion
+   that the bound of the error is about may change all the same, event by event. */
 #include <string.h>
 
 #include "changes.h"
+#include "error_bound.h"
 
 void changes_start(Instance *instance) {
     memcpy(instance->now.stepped_p, instance->now.p, sizeof instance->now.p);
@@ -18,7 +20,8 @@ void changes_begin(Instance *instance) {
 }
 
 void changes_commit(Instance *instance) {
-    (void)instance;
+    bound_over_change(instance);
+    bound_remember(instance);
 }
 
 bool changes_moved(const Instance *instance) {

@@ -33,8 +33,8 @@ Status instance_get_nominals(Instance *instance, double nominals[], size_t count
 /* Whether all of these numbers are of a size up to the limit. */
 bool are_within(const double numbers[], size_t count, double limit);
 
-/* Sizes of numbers up to which products of a few, and of a dozen, surely are doubles. */
-static const double ORDINARY = 0x1p150, TAME = 0x1p60;
+/* The size of numbers up to which products of a few surely are doubles. */
+static const double ORDINARY = 0x1p150;
 
 /* Whether all that follows from states, inputs and composite surely is within the range of doubles. */
 bool instance_is_ordinary(Instance *instance);

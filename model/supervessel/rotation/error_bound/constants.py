@@ -19,6 +19,10 @@ COSINE_SLACK = 2.0**-45
 """Added to the argument of [EB] eq. (10): more than its rounding, 100 u."""
 
 
+SMALLEST = 2.0**-1000
+"""The least number whose reciprocal is taken."""
+
+
 @dataclass(frozen=True)
 class EnergyNorm:
     """The energy norm of a tensor J = L L^T, of which nothing else changes from step to step.
@@ -95,16 +99,18 @@ def largest_eigenvalue(matrix: ca.SX) -> ca.SX:
 def largest_of_traceless(S: ca.SX) -> ca.SX:
     """Returns the largest eigenvalue of a symmetric (3, 3) matrix of trace zero, from above.
 
-    Scaled by its largest element first: no power of it under- or overflows.
+    Scaled by its largest element first: no power of it under- or overflows. Of one whose reciprocal might be
+    no double three times that is returned: the eigenvalue is at most the Frobenius norm.
     """
     size = ca.norm_inf(ca.vec(S))
-    scale = 1.0 / ca.if_else(size > 0.0, size, 1.0)
+    invertible = size > SMALLEST
+    scale = 1.0 / ca.if_else(invertible, size, 1.0)
     unit = symmetric(lambda i, j: scale * S[i, j])
     square = ca.sumsqr(unit) / 6.0
     radius = ca.sqrt(square)
-    cubed = ca.if_else(size > 0.0, square * radius, 1.0)
+    cubed = ca.if_else(invertible, square * radius, 1.0)
     argument = ca.fmin(ca.fmax(0.5 * ca.det(unit) / cubed, -1.0) + COSINE_SLACK, 1.0)
-    return 2.0 * size * radius * _cosine_of_third(argument)
+    return size * ca.if_else(invertible, 2.0 * radius * _cosine_of_third(argument), 3.0)
 
 
 def _cosine_of_third(x: ca.SX) -> ca.SX:
