@@ -71,6 +71,7 @@ static void begin(Progress *progress, double h) {
     progress->taken = progress->error = progress->next_size = 0.0;
     progress->found[0] = progress->found[1] = 0.0;
     progress->was_free = false;
+    progress->exponent = 0;
 }
 
 Status solver_step(Instance *instance, double time, double h, bool *ended_early) {

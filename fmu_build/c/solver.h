@@ -25,7 +25,7 @@ typedef struct {
     double found[2];     /* rad, rad/s: estimated, that the last sub-step added */
     bool was_free;       /* its last sub-step */
     double next_size;    /* s, of the next sub-step, where the error controls it; 0: not known, nor is what follows */
-    int exponent;        /* power of a sub-step that its estimated error grows with */
+    int exponent;        /* power of a sub-step that its estimated error grows with; 0 where none controls it */
 
     /* where series are followed */
     double acceleration[3]; /* rad/s2, by the torque */

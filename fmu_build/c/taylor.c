@@ -87,7 +87,7 @@ Status solver_sub_step(Instance *instance, Progress *progress) {
         taylor_sum(&series, x, map, share, next, rest);
         if (isfinite(found) && is_finite(next)) {
             const double error = share == 1.0 ? found : AIM * allowed * share;
-            const double part = share == 1.0 ? 1.0 : error / found;
+            const double part = share == 1.0 ? 1.0 : error / (found > 0.0 ? found : 1.0);
             progress->found[0] = part * series.error[0];
             progress->found[1] = part * series.error[1];
             const double turned_on = 2.0 * HALF_ULP * speed * progress->remaining; /* adds up as a random walk does */
