@@ -1,6 +1,7 @@
 """The bound of what a scene's law and method are off by, of the twin's own expressions."""
 
 from collections.abc import Mapping
+from functools import reduce
 
 import casadi as ca
 
@@ -58,7 +59,8 @@ def bound_over_change(
     omega  : of the cheap motion, (3,) [rad/s], before the change
     inputs : p before, p after, (n,), motions at contact k
     What the true motion keeps is what the scene says for the law "tensor". Docks that open leave both rates,
-    and those that close alter both alike, except under the law "none". [EB] eqs. (21), (22).
+    and those that close alter both alike, except under the law "none". A stage in which nothing changes costs
+    nothing. [EB] eqs. (21), (22).
     """
     before, after, k = inputs
     resolved, margins = model.resolved, composite_slices()["margins"]
@@ -74,8 +76,10 @@ def bound_over_change(
         if "momentum" in model.slices.composite:
             place = model.slices.composite["momentum"]
             excess += d[place][:3] - c[place][:3]
-        energy = kept_momentum(kept_rate(energy, seen_in, first), first, last, excess) + refused
-        omega, seen_in = turned, last
+        kept_so = kept_momentum(kept_rate(energy, seen_in, first), first, last, excess) + refused
+        moved = reduce(ca.logic_or, ca.vertsplit(stage.before != stage.after))
+        energy, seen_in = ca.if_else(moved, kept_so, energy), ca.if_else(moved, last, seen_in)
+        omega = turned
     end = inertia_of(model.composite(after))
     energy = kept_rate(energy, seen_in, end)
     if model.change is None and closing.numel():
