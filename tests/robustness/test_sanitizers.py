@@ -28,7 +28,7 @@ SUITE_TIME_LIMIT = 3600.0  # s; about ten minutes on two cores
 LIBRARIES = 100
 """The suite flies more of them; fewer would say that it flies others, without sanitizers."""
 PROPAGATORS = [(2, "rk4"), (3, "rk4"), (2, "auto"), (3, "auto"), (3, "split")]
-SCENES = [(fmi, scene) for scene in ("moving", "mixed", "docks", "capture") for fmi in (2, 3)]
+SCENES = [(fmi, scene) for scene in ("moving", "mixed", "docks", "capture", "bounded") for fmi in (2, 3)]
 BUILDS = pytest.mark.parametrize(("fmi", "propagator"), [*PROPAGATORS, *SCENES])
 """FMI version, and propagator of RAW or one of CHANGING."""
 SANITIZED = (
@@ -125,9 +125,19 @@ CHANGING = {
             "rotation.propagator": "taylor",
         },
     ),
+    "bounded": variant(
+        MOVING,
+        {
+            "docks": DOCKS,
+            "inputs.docked": ["berth", "tail"],
+            "rotation.law": "principal",
+            "rotation.mass_change": "rate",
+            "outputs.names": [*MOVING["outputs"]["names"], "error_bound"],
+        },
+    ),
 }
 """Scenes with forces: a port moves and all changes keep momentum, or poses alone do; docks open and close
-beside, or two of them at one port by turns."""
+beside, or two of them at one port by turns; the bound of a cheap law's error is carried along all that."""
 
 
 @cache

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from supervessel import Scene, parse_scene
+from supervessel.scene.schema import Accuracy
 
 LAWS = ("none", "decoupled", "principal", "tensor")
 PROPAGATORS = ("rk4", "dop853", "taylor", "exact", "split", "auto")
@@ -105,10 +106,18 @@ def body(mass: float = 1000.0, pmi: Sequence[float] = (1.0, 2.0, 2.5), **rotatio
 
 def scene(raw: Mapping[str, Any]) -> Scene:
     """Returns the scene of a raw one; where it does not say otherwise propagated by RK4, whose steps can be
-    foretold, and keeping the angular velocity when poses change."""
+    foretold, and keeping the angular velocity when poses change. The law "none" keeps it anyway.
+
+    A raw scene with [accuracy] has its law and propagator by the test: the scene is as `choose`
+    would leave it.
+    """
+    if "accuracy" in raw:
+        asked = Accuracy.model_validate(raw["accuracy"])
+        return scene(variant(raw, {"accuracy": None})).model_copy(update={"accuracy": asked})
     given = raw.get("rotation", {})
     unless = {"rotation.propagator": "rk4"}
-    if raw.get("inputs", {}).get("pose") and not raw["inputs"].get("motion"):
+    posed = raw.get("inputs", {}).get("pose") and not raw["inputs"].get("motion")
+    if posed and given.get("law") != "none":
         unless["rotation.pose_change"] = "rate"
     changes = {k: given.get(k.removeprefix("rotation."), v) for k, v in unless.items()}
     return parse_scene(variant(raw, changes))

@@ -5,12 +5,12 @@ Each does what it does in good surroundings, byte for byte, or says in one line 
 
 import itertools
 import os
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from support.locales import german
 from support.surroundings import (
     AS_STRANGER,
     BUILD,
@@ -221,20 +221,10 @@ def test_python_m_runs_modules_of_the_working_folder_by_itself_and_the_compiler_
 # Locales.
 
 
-@pytest.fixture(scope="module")
-def german(tmp_path_factory):
+@pytest.fixture(scope="module", name="german")
+def with_comma(tmp_path_factory):
     """The variables of a locale with a decimal comma."""
-    folder = tmp_path_factory.mktemp("locales")
-    made = folder / "de_DE.UTF-8"
-    try:
-        done = subprocess.run(
-            ["localedef", "-i", "de_DE", "-f", "UTF-8", str(made)], capture_output=True, check=False
-        )
-    except FileNotFoundError:
-        pytest.skip("localedef is not installed")
-    if not made.is_dir():
-        pytest.skip(f"no locale de_DE can be made: {done.stderr.decode()[:200]}")
-    return {"LOCPATH": str(folder), "LC_ALL": "de_DE.UTF-8", "LANG": "de_DE.UTF-8"}
+    return german(tmp_path_factory.mktemp("locales"))
 
 
 @pytest.mark.parametrize("words", COMMANDS.values(), ids=COMMANDS)
