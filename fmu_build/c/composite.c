@@ -199,6 +199,9 @@ void composite_refresh_axes(Instance *instance) {
     instance->res[0] = instance->now.a;
     /* what the bound of the error needs leaves the range of doubles before moments and axes do */
     instance_call(instance, axes, !ERROR_BOUND || instance->now.composite_is_ordinary);
+    if (ERROR_BOUND)
+        instance->now.constants_are_tame = are_within(instance->now.a, AXES_COUNT, TAME_CONSTANTS) &&
+                                           are_within(instance->now.c, COMPOSITE_COUNT, TAME_CONSTANTS);
 #endif
     instance->now.axes_are_current = true;
     instance->outputs_are_current = false;

@@ -192,22 +192,36 @@ static void tell(Instance *instance) {
 #endif
 }
 
+static double sum_of_sizes(const double numbers[], size_t count) {
+    double sum = 0.0;
+    for (size_t i = 0; i < count; i++) sum += fabs(numbers[i]);
+    return sum;
+}
+
+/* Sizes of a step's numbers up to which, with constants up to TAME_CONSTANTS, whatever the bound is made of is far below
+   the largest double: no product in it has more than 500 of their binary digits. */
+static const double TAME_STEP = 0x1p40;
+
 /* Takes the bound over a sub-step. Returns false where nothing is known any more: also where numbers are so far from 1
-   that what the bound is made of may be no doubles. The largest of them and an exponential may be none anywhere, so
-   that the importer's flags are kept from all of it. */
+   that what the bound is made of may be no doubles. Where these may be too large, the importer's flags are kept from
+   it: that takes twice the time. */
 static bool carry(Instance *instance, const double x[], double size, const Progress *progress) {
     Dynamics *now = &instance->now;
-    if (!has_inertia(now->c) || !instance_is_ordinary(instance) || !are_within(x, STATE_COUNT, ORDINARY)) return false;
+    if (!has_inertia(now->c)) return false;
     composite_refresh_axes(instance);
     const double power = progress->was_free ? 0.0 : progress->exponent;
     const double s[4] = {size, power, progress->found[0], progress->found[1]};
+    const double sizes = sum_of_sizes(x + 4, 3) + sum_of_sizes(s, 4) + sum_of_sizes(now->bound, 3) +
+                         sum_of_sizes(&now->values[REFERENCE_TORQUE], INPUT_U_COUNT);
+    const bool tame = now->constants_are_tame && sizes <= TAME_STEP;
+    if (!tame && !(instance_is_ordinary(instance) && are_within(x, STATE_COUNT, ORDINARY))) return false;
     double after[3];
     instance_set_arguments(instance);
     instance->arg[0] = x;
     instance->arg[4] = s;
     instance->arg[5] = now->bound;
     instance->res[0] = after;
-    instance_call(instance, bound_step, false);
+    instance_call(instance, bound_step, tame);
     if (!isless(after[ANGLE], PI) || !isfinite(after[ENERGY]) || !isfinite(after[RATE])) return false;
     memcpy(now->bound, after, sizeof after);
     now->errors[BOUND] = after[ANGLE];

@@ -124,6 +124,7 @@ typedef struct {
     unsigned stop_time_defined;
     unsigned composite_is_current;    /* p and c follow from the inputs as they are */
     unsigned composite_is_ordinary;   /* products of a few numbers of p and c are doubles */
+    unsigned constants_are_tame;      /* c and a are of no size that the bound of the error has to be careful with */
     unsigned axes_are_current;        /* a follows from c */
     unsigned epoch_holds;             /* the motion has been free since epoch, with stepped_p */
     unsigned epoch_step;              /* an EpochStep */

@@ -36,6 +36,9 @@ bool are_within(const double numbers[], size_t count, double limit);
 /* The size of numbers up to which products of a few surely are doubles. */
 static const double ORDINARY = 0x1p150;
 
+/* Sizes of composite, moments and axes up to which the bound of the error is computed without precautions. */
+static const double TAME_CONSTANTS = 0x1p50;
+
 /* Whether all that follows from states, inputs and composite surely is within the range of doubles. */
 bool instance_is_ordinary(Instance *instance);
 

@@ -159,6 +159,7 @@ SCENES = {
             "inputs": {"docked": ["berth"]},
         },
     ),
+    "bounded": variant(body(propagator="rk4"), {"outputs.names": ["error_bound"]}),
     "many vessels": station(60, [f"v{i}" for i in range(60)]),
 }
 

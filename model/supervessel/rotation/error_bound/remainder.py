@@ -152,7 +152,7 @@ def step_error(
     if remainder is None:
         return ca.vertcat(pi * quaternion, energy)
     known = motion.share <= remainder.limit
-    power = _power(motion.share, remainder.power)
+    power = _power(ca.fmin(motion.share, remainder.limit), remainder.power)
     power = ca.if_else(known, power, ca.inf if estimate is None else 0.0)
     if constants.law.gyroscopic_term:
         energy += root * (remainder.rate * motion.scale * power)
