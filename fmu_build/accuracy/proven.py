@@ -319,8 +319,9 @@ def _method_sources(
     What rk4 leaves out is that of a single sub-step: smaller ones leave out less. Its rounding is of all.
     Of other methods each communication step adds the tolerance.
     """
-    rates = rates_over(found, *box)
-    speed = float(np.linalg.norm(rates))
+    with np.errstate(over="ignore", invalid="ignore"):  # of a box that is not bounded
+        rates = rates_over(found, *box)
+        speed = float(np.linalg.norm(rates))
     if method == "estimate":
         tolerance = scene.rotation.tolerance
         return tolerance / step, tolerance * speed * found.heaviest / step, 0.0
