@@ -42,7 +42,7 @@ def law_is_off(scene: Scene, accuracy: Accuracy, choice: Choice) -> str:
     if choice.model.law == "tensor":
         return ""
     flown = under(scene, choice)
-    bound = proven_bound(flown, accuracy.horizon, accuracy.step)
+    bound = proven_bound(flown, accuracy.horizon, accuracy.step, of_law_alone=True)
     why = _in_the_way(bound, accuracy)
     if not why:
         return ""

@@ -73,11 +73,12 @@ class ProvenBound:
     why: str
 
 
-def proven_bound(scene: Scene, duration: float, step: float) -> ProvenBound:
+def proven_bound(scene: Scene, duration: float, step: float, *, of_law_alone: bool = False) -> ProvenBound:
     """Returns the bound over all inputs in their ranges, held over communication steps, from the start.
 
     scene          : with law, propagator and its setting; every input that is a number with a range
     duration, step : [s], of the flight, of a communication step
+    of_law_alone   : whether steps of the method are left out, everywhere
     """
     count = max(1, ceil(duration / step * (1.0 - 1e-12)))
     points = np.unique(np.rint(np.linspace(1, count, min(count, MOST_POINTS))))
@@ -87,7 +88,7 @@ def proven_bound(scene: Scene, duration: float, step: float) -> ProvenBound:
     if isinstance(found, str):
         unknown = np.full(len(times), inf)
         return ProvenBound(times, unknown, unknown, unknown, unknown, "remainder", inf, inf, found)
-    return _flown(scene, found, times, step)
+    return _flown(scene, found, times, step, of_law_alone=of_law_alone)
 
 
 def to_narrow(scene: Scene, duration: float, step: float) -> str:
@@ -102,8 +103,8 @@ def to_narrow(scene: Scene, duration: float, step: float) -> str:
         found = _known(resolved, narrowed)
         if isinstance(found, str):
             continue
-        bound = _flown(scene, found, np.array([duration]), step)
-        size = bound.law[-1] if isfinite(bound.law[-1]) else 1e300 * min(bound.growth, 1e6)
+        law = _along(scene, found, (np.array([duration]), step), _nothing)
+        size = law.angles[-1] if isfinite(law.angles[-1]) else 1e300 * min(law.growth, 1e6)
         if size < best:
             best, name = size, group
     return name
@@ -212,14 +213,18 @@ def _energy_after(found: RangeSuprema, energy: float, span: float) -> float:
     return inf
 
 
-def _flown(scene: Scene, found: RangeSuprema, times: Array, step: float) -> ProvenBound:
+def _flown(
+    scene: Scene, found: RangeSuprema, times: Array, step: float, *, of_law_alone: bool
+) -> ProvenBound:
     """Returns the bound along the flight, of the law's exact motion and of a method's steps."""
     method = _method(scene)
 
     def sources(box: tuple[Array, Array]) -> tuple[float, float, float]:
         return _method_sources(scene, found, box, step, method)
 
-    law, whole = (_along(scene, found, (times, step), each) for each in (_nothing, sources))
+    law = whole = _along(scene, found, (times, step), _nothing)
+    if not of_law_alone:
+        whole = _along(scene, found, (times, step), sources)
     why = ""
     if not isfinite(law.angles[-1]):
         why = "growth: errors may grow beyond any bound in the ranges"

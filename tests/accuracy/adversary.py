@@ -16,7 +16,7 @@ import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -33,6 +33,8 @@ from accuracy.nasty_scenes import Raw, scene_of
 from accuracy.truth import RTOL, after_a_step, turned
 from fmu_build import BuildError, build_fmu
 from fmu_build.accuracy.search import Search
+from fmu_build.compile.compiler import TRIAL_FLAGS
+from fmu_build.compile.library import compile_sources
 from fmu_build.flight.choices import Model, laws_of
 from fmu_build.flight.distance import attitude_apart
 from supervessel import Scene, parse_scene, reference
@@ -150,6 +152,10 @@ def both_rules() -> Iterator[dict[str, Any]]:
         yield seen
 
 
+quickly = partial(compile_sources, flags=TRIAL_FLAGS)
+"""What compiles an FMU's library in a fifth of the time; it gives the same numbers to the last bit."""
+
+
 def examined(number: int, *, rules: bool = True) -> Record:
     """Returns what came of a scene: the choice, its grade, and how near each attack came to breaking it.
 
@@ -168,7 +174,8 @@ def attacked(raw: Raw, seed: int, folder: Path, *, rules: bool = True) -> Record
     begun, scene = _seconds(), parse_scene(raw)
     with both_rules() if rules else _nothing() as seen:
         try:
-            fmu = build_fmu(scene, folder / f"{scene.name}.fmu")
+            with mock.patch("fmu_build.build.compile_sources", quickly):
+                fmu = build_fmu(scene, folder / f"{scene.name}.fmu")
         except BuildError as error:
             if not str(error).startswith(f"{scene.name}: accuracy"):
                 raise
