@@ -98,7 +98,7 @@ def true_flights(scene: Scene, against: Sequence[Attack], law: str = "tensor", r
             M = 0.0 * M
         turning = float(law in ("tensor", "principal"))
         states = after_a_step(states, accuracy.step, J, M, rtol, turning)
-        found.append(states)
+        found.append(states.copy())  # states change in place with the inputs
     return Flights([attack.name for attack in against], courses, np.array(found))
 
 
