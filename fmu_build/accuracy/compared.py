@@ -80,6 +80,8 @@ class Compared:
     spin_rate       : |h| trace(J^-1) [rad/s], bounds |J^-1 (w x h)|/|w|
     kept            : the law's tensor and spin, whose momentum a change keeps, and the tensor's inverse,
                       (3, 3), (3,), (3, 3); zero where a change keeps the rate
+    rounded         : what rounding of a step depends on, [EB] eq. (28): D^-1, J and h, (3, 3), (3, 3), (3,),
+                      zero where the law has no such term, and the torque by u, (3, m)
     """
 
     cheap: Quadratic
@@ -102,6 +104,7 @@ class Compared:
     begun: ca.SX
     spin_rate: ca.SX
     kept: tuple[ca.SX, ca.SX, ca.SX]
+    rounded: tuple[ca.SX, ca.SX, ca.SX, ca.SX]
 
     @property
     def forms(self) -> list[ca.SX]:
@@ -169,6 +172,7 @@ def rates_compared(law: Law, body: ActedOn, middle: Array, start: Array) -> Comp
         begun=zeros,
         spin_rate=body.spin_rate,
         kept=(ca.SX(3, 3), zeros, ca.SX(3, 3)),
+        rounded=_rounded(law, body),
     )
 
 
@@ -211,6 +215,7 @@ def momenta_compared(law: Law, body: ActedOn, middle: Array, start: Array, shift
         begun=into @ (c - (J - D) @ w),
         spin_rate=body.spin_rate,
         kept=(nothing, zeros, nothing) if steady else (D, h, inverse),
+        rounded=_rounded(law, body),
     )
 
 
@@ -244,6 +249,17 @@ def _kept_tensor(law: Law, body: ActedOn) -> tuple[ca.SX, ca.SX]:
         return body.inertia, body.inverse
     D = LAWS[law].keeping(body.inertia)
     return D, ca.diag(1.0 / ca.diag(D))
+
+
+def _rounded(law: Law, body: ActedOn) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+    """Returns what rounding of a step under a law depends on, see `Compared`. [EB] eq. (28)."""
+    nothing = ca.SX(3, 3)
+    if law == "none":
+        return nothing, nothing, ca.SX.zeros(3), 0 * body.arm
+    _, inverse = _kept_tensor(law, body)
+    if not LAWS[law].gyroscopic_term:
+        return inverse, nothing, ca.SX.zeros(3), body.arm
+    return inverse, body.inertia, body.spin, body.arm
 
 
 def _rate_motion(law: Law, body: ActedOn) -> Quadratic:

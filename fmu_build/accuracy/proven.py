@@ -178,13 +178,13 @@ def _boxes(found: RangeSuprema, spans: Array, step: float, sources: Sources) -> 
     nowhere = np.full(3, -inf), np.full(3, inf)
     boxes: list[tuple[Array, Array]] = []
     for span in spans:
-        energy = _energy_after(found, energy, float(span))
         inner, outer = low, high
         for _ in range(60):
             by_steps = (float(span) + step) * sources((inner, outer))[2] * SLACK
             if not isfinite(by_steps):
                 return boxes + [nowhere] * (len(spans) - len(boxes))
-            cap = (energy + heaviest * by_steps) * shares
+            reached = _energy_after(found, energy + heaviest * by_steps, float(span))
+            cap = reached * shares
             change = span * found.cheap.fastest(np.maximum(np.abs(inner), np.abs(outer))) * SLACK + by_steps
             wanted = np.maximum(low - change, -cap), np.minimum(high + change, cap)
             if np.all(wanted[0] >= inner) and np.all(wanted[1] <= outer):
@@ -194,16 +194,20 @@ def _boxes(found: RangeSuprema, spans: Array, step: float, sources: Sources) -> 
         else:
             inner, outer = wanted = -1.05 * cap, 1.05 * cap
             by_steps = (float(span) + step) * sources(wanted)[2] * SLACK
-            if not np.all((energy + heaviest * by_steps) * shares <= outer):
+            reached = _energy_after(found, energy + heaviest * by_steps, float(span))
+            if not np.all(reached * shares <= outer):
                 return boxes + [nowhere] * (len(spans) - len(boxes))
         boxes.append((inner, outer))
-        energy += heaviest * by_steps
+        energy = reached
         low, high = wanted
     return boxes
 
 
 def _energy_after(found: RangeSuprema, energy: float, span: float) -> float:
-    """Returns a bound of the length n of own^T y over a span. [EB] eqs. (31), (35)."""
+    """Returns a bound of the length n of own^T y over a span. [EB] eqs. (31), (35).
+
+    energy : of n at the start, and all that steps of a method add to it on the way: that grows along with n
+    """
     top = energy + found.pushed * span
     for _ in range(100):
         wanted = (energy + (found.own_cubic * top * top + found.pushed) * span) * SLACK
@@ -340,7 +344,8 @@ def _method_sources(
     power = float(z**constants.power)
     fastest = float(np.linalg.norm(found.law.fastest(rates)))
     sub_steps = _most_sub_steps(scene.rotation.max_angle_step, step, speed, fastest, found.spin_rate)
-    rounding = 0.5 * EPSILON * (4.0 * speed * sub_steps + DEPTH * step * fastest)
+    force = found.torque + speed * (found.inertia * speed + found.spin)
+    rounding = 0.5 * EPSILON * (4.0 * speed * sub_steps + DEPTH * step * found.lightness * force)
     rounding += 0.5 * EPSILON * CHANGES * CHANGE_DEPTH * (found.change_speed * speed + found.change_spin)
     rate = constants.rate * v * power * bool(LAWS[scene.rotation.law].products) + rounding
     turn = pi * (

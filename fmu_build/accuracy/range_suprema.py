@@ -100,6 +100,10 @@ class RangeSuprema:
     change_speed : rounding of a change of inputs, over u and roundings: by the rate [1]; [EB] eq. (42)
     change_spin  : and by the spin of moving parts [rad/s]
     spin_rate    : largest |h| trace(J^-1) [rad/s]
+    lightness    : largest Frobenius norm of the inverse of the law's tensor [1/(kg m2)]; [EB] eq. (28)
+    inertia      : and of the tensor [kg m2], 0 where the law has no gyroscopic term
+    spin         : and of the spin of moving parts [N m s], likewise
+    torque       : longest torque under the law [N m]
     """
 
     start: tuple[Array, Array]
@@ -123,6 +127,10 @@ class RangeSuprema:
     change_speed: float
     change_spin: float
     spin_rate: float
+    lightness: float
+    inertia: float
+    spin: float
+    torque: float
 
 
 def ranges_of(resolved: ResolvedScene) -> dict[str, tuple[float, float]]:
@@ -211,6 +219,10 @@ def _suprema(
         change_speed=6.0 * SLACK * inverse * D,
         change_spin=2.0 * SLACK * inverse * h,
         spin_rate=_frobenius(found["spin_rate"]),
+        lightness=SLACK * _frobenius(found["rounded_inverse"]),
+        inertia=SLACK * _frobenius(found["rounded_tensor"]),
+        spin=SLACK * _frobenius(found["rounded_spin"]),
+        torque=_by_acting(found["rounded_arm"], resolved, ranges),
     )
 
 
@@ -237,7 +249,8 @@ def _expressions(compared: Compared) -> dict[str, ca.SX]:
     for name in ("off", "rate"):
         found[f"{name}_linear"], found[f"{name}_constant"] = getattr(compared, name)
     found["kept_tensor"], found["kept_spin"], found["kept_inverse"] = compared.kept
-    return found
+    names = ("rounded_inverse", "rounded_tensor", "rounded_spin", "rounded_arm")
+    return found | dict(zip(names, compared.rounded, strict=True))
 
 
 def _over_boxes(compared: Compared, p: ca.SX, boxes: tuple[Array, Array]) -> dict[str, Interval] | None:

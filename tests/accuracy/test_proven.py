@@ -14,6 +14,7 @@ from fmu_build.accuracy import compared, proven, range_suprema
 from fmu_build.accuracy.intervals import boxes_of, over_boxes
 from fmu_build.accuracy.proven import proven_bound, to_narrow
 from supervessel import Scene, Twin, parse_scene
+from supervessel.composite.resolved import resolve
 
 Array = NDArray[np.float64]
 ROOT = Path(__file__).parents[2]
@@ -148,6 +149,58 @@ def test_refusals_say_what_is_in_the_way() -> None:
     open_range = {"range": {key: v for key, v in scene.inputs.range.items() if key != "B.mass"}}
     inputs = scene.inputs.model_copy(update=open_range)
     assert "B.mass has no range" in proven_bound(scene.model_copy(update={"inputs": inputs}), 10.0, 1.0).why
+
+
+def slender(spin: Array, seed: int) -> Scene:
+    """Returns one body whose moments are a million apart, in tilted axes; spin : in principal axes."""
+    random = np.random.default_rng(seed)
+    R = np.linalg.qr(random.normal(size=(3, 3)))[0]
+    J = R @ np.diag([1e-6, 1.0, 1.0 + 1e-6 * random.uniform(-0.9, 0.9)]) @ R.T
+    return parse_scene(
+        {
+            "name": "slender",
+            "root": "R",
+            "vessels": {"R": {"mass": 1.0, "inertia": (0.5 * (J + J.T)).tolist()}},
+            "inputs": {"torque": True, "range": {"torque": [0.0, 0.0]}},
+            "rotation": {"law": "tensor", "propagator": "rk4", "angular_velocity": (R @ spin).tolist()},
+        }
+    )
+
+
+def rk4_rate_by_mpmath(J: Array, w: Array, step: float) -> Array:
+    """Returns the rate, (3,), after a step of rk4 without torque, of which nothing is lost to rounding."""
+    with mpmath.workdps(40):
+        tensor, h = mpmath.matrix(J.tolist()), mpmath.mpf(step)
+        inverse = tensor**-1
+
+        def slope(v: Any) -> Any:
+            H = tensor * v
+            turned = [v[i - 2] * H[i - 1] - v[i - 1] * H[i - 2] for i in range(3)]
+            return -inverse * mpmath.matrix(turned)
+
+        start = mpmath.matrix(w.tolist())
+        k1 = slope(start)
+        k2 = slope(start + k1 * (h / 2))
+        k3 = slope(start + k2 * (h / 2))
+        k4 = slope(start + k3 * h)
+        return np.array(list(start + (k1 + 2 * k2 + 2 * k3 + k4) * (h / 6)))
+
+
+def test_rounding_of_a_step_is_within_what_is_added_for_it() -> None:
+    """[EB] eq. (28): with |D^-1| and |J|, as much of their product cancels in the acceleration itself."""
+    step, largest = 1e-3, 0.0
+    for seed in range(12):
+        scene = slender(np.array([0.2, 0.3, 1.0]), seed)
+        twin = Twin(scene)
+        found = range_suprema.range_suprema(resolve(scene), proven.ranges_of(resolve(scene)), "rate")
+        assert found is not None
+        w = np.array(scene.rotation.angular_velocity)
+        end = np.array(twin.step(twin.x_start, [0.0, 0.0, 0.0], twin.p_start, step)).ravel()[4:]
+        off = end - rk4_rate_by_mpmath(np.array(twin.composite(twin.p_start)[2]), w, step)
+        added = proven._method_sources(scene, found, (w, w), step, "remainder")[2] * step
+        largest = max(largest, float(np.linalg.norm(off.astype(float))) / added)
+    print(f"{largest:.2g} of what is added")
+    assert 0.0 < largest <= 1.0
 
 
 def test_step_too_long_for_the_remainder_is_told() -> None:
