@@ -348,6 +348,28 @@ def test_two_scalar_equations_are_bounded_from_above() -> None:
                     assert bound <= right * (1 + z * z / 3 + z / 1e3 + 1e-12) * (1 + z) ** 2 + 1e-15
 
 
+@pytest.mark.parametrize("condition", [1e2, 1e4, 1e6])
+def test_factors_of_a_tensor_cost_the_bound_no_more_than_its_condition(condition: float) -> None:
+    """From rest, torque along the lightest axis, law "none": the bound is the angle |J^-1 M| h^2/2 itself.
+
+    Pivots lose up to u times the condition number of themselves: so much the bound may be short of it.
+    """
+    random, short = np.random.default_rng(3), 0.0
+    for _ in range(40):
+        R = random_rotation(random, 3.0)
+        J = R @ np.diag([1.0 / condition, 1.0, 1.0 + 0.3 / condition]) @ R.T
+        J = 0.5 * (J + J.T)
+        moments, axes = np.linalg.eigh(J)
+        M = moments[0] * axes[:, 0]
+        x = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+        _, bound, _ = called(bound_function("none"), x, [0.0, 0.0], six_of(J), M, np.zeros(3), 1.0)
+        with mpmath.workdps(40):
+            right = mpmath.norm(mpmath.lu_solve(mpmath.matrix(J.tolist()), mpmath.matrix(M.tolist()))) / 2
+            short = max(short, float(right / mpmath.mpf(bound[0]) - 1))
+    print(f"{condition:.0e}: short by {short:.1e}")
+    assert short <= 0.5 * EPS * condition
+
+
 @pytest.mark.parametrize("kept", ["rate", "momentum"])
 def test_change_of_inertia_never_exceeds_and_is_met_by_some_error(kept: str) -> None:
     """[EB] eqs. (21), (22): over all directions of e the bound is reached within 1 %."""
