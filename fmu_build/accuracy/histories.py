@@ -390,7 +390,8 @@ def _spun_up(  # noqa: PLR0913, PLR0917
             mean = np.zeros(3)
             for part, weight in ((0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)):
                 w = omega + part * h * k
-                k = push - inverse @ np.cross(w, inertia @ w)
+                with np.errstate(over="ignore", invalid="ignore"):  # looked at below
+                    k = push - inverse @ np.cross(w, inertia @ w)
                 mean += weight / 6.0 * k
             omega = omega + h * mean
         if not np.all(np.isfinite(omega)):

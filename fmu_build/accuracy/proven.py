@@ -267,9 +267,8 @@ def _along(scene: Scene, found: RangeSuprema, at: tuple[Array, float], sources: 
         if not np.isfinite(box).all():
             most = [inf, inf]
             break
-        growth = growth_over(found, *box)
-        residual = 0.0 if scene.rotation.law == "tensor" else residual_over(found, *box)
-        off = off_over(found, *box)
+        growth, off = float(growth_over(found, *box)), float(off_over(found, *box))
+        residual = 0.0 if scene.rotation.law == "tensor" else float(residual_over(found, *box))
         most = [max(most[0], growth), max(most[1], residual)]
         added = sources(box)
 
@@ -283,9 +282,9 @@ def _along(scene: Scene, found: RangeSuprema, at: tuple[Array, float], sources: 
             return so_far.after(span, growth, found.cubic, residual + added[1], off + added[0])
 
         for i in np.flatnonzero((times > begun + 1e-9 * step) & (times <= end * (1 + 1e-12))):
-            there = after(times[i] - begun)
+            there = after(float(times[i]) - begun)
             angles[i], rates[i] = there.angle, there.rate_share * there.energy + off
-        carried, begun = after(span), float(end)
+        carried, begun = after(float(span)), float(end)
     return _Along(angles, rates, *most)
 
 
@@ -305,7 +304,7 @@ class _Carried:
         top = max(self.energy, residual * span) * 1.1
         for _ in range(40):
             exponent = (growth + cubic * top) * span
-            if exponent > 300.0 or not isfinite(residual):
+            if not exponent <= 300.0 or not isfinite(residual):
                 break
             rise = exp(exponent) * SLACK
             energy = rise * self.energy + residual * span * 0.5 * (1.0 + rise)
