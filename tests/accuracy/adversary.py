@@ -51,6 +51,9 @@ NEAR = 0.5
 
 COARSER = 100.0 * RTOL
 
+ROUNDING = 1e-12
+"""What two ways to the same exact motion may differ by [rad]; the law's bound is of exact motions."""
+
 
 @dataclass(frozen=True)
 class Flights:
@@ -237,7 +240,7 @@ def judged(
         "doubt": float(doubt.max()),
         "broken": named((sure > asked["attitude"]) | rates_off),
         "bound_broken": named(sure > grade["attitude"]) if grade["name"] == "proven" else [],
-        "law_broken": named(by_law - doubt > (np.inf if grade["law"] is None else grade["law"])),
+        "law_broken": named(by_law - doubt - ROUNDING > (np.inf if grade["law"] is None else grade["law"])),
         "by_law": float(by_law.max()),
         "output": _of_output(output, angles, doubt, asked["attitude"], flights.names) if has_output else None,
     }
