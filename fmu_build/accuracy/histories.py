@@ -70,8 +70,8 @@ SHAKEN, SHAKEN_CORNERS = 3, 12
 MOST_COMBINATIONS = 64
 """Combinations of docks that are held one by one, at most."""
 
-CLIMBED = 200
-"""Rows that are tried beside the one, of those drawn, in which small disturbances grow fastest."""
+JUDGED, CLIMBED = 768, 200
+"""Rows of those drawn that are judged by how fast small disturbances grow, and rows tried beside the best."""
 
 MOST_SAMPLES = 1000
 """Communication points at which a flight is looked at, evenly spaced, the last one among them."""
@@ -344,6 +344,7 @@ def _growing(  # noqa: PLR0913, PLR0917
         return float(f"{np.linalg.eigvals(np.linalg.solve(J, linear)).real.max():.6g}")
 
     rows = rows[np.sort(np.unique(np.where(columns.acting, 0.0, rows), axis=0, return_index=True)[1])]
+    rows = rows[:: 1 + len(rows) // JUDGED]
     found = [growth(row) for row in rows]
     if not found or max(found) <= 0.0:
         return
