@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from supervessel.composite.actions import torque_about_barycentre
 from supervessel.composite.inertia import from_upper_triangle, ldl, ldl_inverse, upper_triangle
 from supervessel.composite.resolved import ResolvedScene
+from supervessel.rotation.changes import spin_of
 from supervessel.rotation.laws import LAWS, MIXED_PRODUCTS, SQUARES
 from supervessel.scene.schema import Law
 
@@ -131,10 +132,9 @@ class ActedOn:
 def acted_on(resolved: ResolvedScene, parts: Mapping[str, ca.SX]) -> ActedOn:
     """Returns the composite of which these are parts."""
     J = from_upper_triangle(parts["inertia"])
-    spin = parts["momentum"][:3] if "momentum" in parts else ca.SX.zeros(3)
     u = ca.SX.sym("u", len(resolved.acting))
     arm = ca.jacobian(torque_about_barycentre(resolved, parts, u), u) if u.numel() else ca.SX.zeros(3, 0)
-    return ActedOn(J, ldl_inverse(*ldl(J)), spin, arm)
+    return ActedOn(J, ldl_inverse(*ldl(J)), spin_of(parts), arm)
 
 
 def rates_compared(law: Law, body: ActedOn, middle: Array, start: Array) -> Compared:

@@ -177,8 +177,9 @@ def histories(scene: Scene, accuracy: Accuracy, judge: Judge, body: Body) -> His
             times = np.unique([0, *(int(random.random() * course.steps) for _ in rows[1:])])
             if len(rows):
                 flown.append(History(f"one input at a time {i}", columns.inputs(times, rows[: len(times)])))
-        flown += _together(columns, course, corners, judge)
-        flown += _shaken(columns, course, scene, corners, judge, body)
+        opposite = _opposite(columns, corners, judge)
+        flown += _together(columns, course, opposite)
+        flown += _shaken(columns, course, scene, opposite, body)
         flown += _growing(columns, scene, random, np.concatenate([corners, inside[fits[2]]]), judge, body)
         if columns.acting.any():
             starts = (columns.start, *_easiest(columns, corners[:SPUN], body))
@@ -269,9 +270,9 @@ def _easiest(columns: _Columns, corners: Array, body: Body) -> list[Array]:
     return [corners[int(np.argmax(strength))]] if strength else []
 
 
-def _together(columns: _Columns, course: Course, corners: Array, judge: Judge) -> Iterator[History]:
-    """Yields histories in which everything jumps to the opposite corner and back, if both make sense."""
-    here, there = _opposite(columns, corners, judge)
+def _together(columns: _Columns, course: Course, opposite: tuple[Array, Array]) -> Iterator[History]:
+    """Yields histories in which everything jumps to the opposite corner and back."""
+    here, there = opposite
     stride = ceil(course.steps * len(columns.low) / MOST_NUMBERS)
     for i, half in enumerate(TOGETHER if len(here) else ()):
         rows = np.arange(0, course.steps, max(half, stride))
@@ -289,18 +290,18 @@ def _opposite(columns: _Columns, corners: Array, judge: Judge) -> tuple[Array, A
     return here[fits], there[fits]
 
 
-def _shaken(  # noqa: PLR0913, PLR0917
-    columns: _Columns, course: Course, scene: Scene, corners: Array, judge: Judge, body: Body
+def _shaken(
+    columns: _Columns, course: Course, scene: Scene, opposite: tuple[Array, Array], body: Body
 ) -> Iterator[History]:
     """Yields the square waves of all inputs along which small errors grow most, each of other corners."""
-    here, there = _opposite(columns, corners, judge)
+    if course.steps * len(columns.low) > MOST_NUMBERS:
+        return
+    here, there = opposite
     ends = [_ends(columns, pair, body) for pair in zip(here[:SHAKEN_CORNERS], there, strict=False)]
     sound = [i for i, one in enumerate(ends) if one is not None]
     rate, momentum = np.array(scene.rotation.angular_velocity), "momentum" in scene.keeps.values()
     known = [one for one in ends if one is not None]
     waves = waves_that_grow(known, rate, course.size, course.steps, momentum=momentum)
-    if course.steps * len(columns.low) > MOST_NUMBERS:
-        return
     seen: set[int] = set()
     for wave in waves:
         if wave.ends in seen or len(seen) == SHAKEN:

@@ -77,14 +77,11 @@ def waves_that_grow(
         return []
     waves = [Wave(*shape, 0.0) for shape in shapes]
     at = np.array([wave.at_first(min(steps, FOLLOWED)) for wave in waves])
-    inertia, push = (np.array([part[wave.ends] for wave in waves]) for part in _stacked(ends))
+    inertia = np.array([ends[wave.ends].inertia for wave in waves])
+    push = np.array([ends[wave.ends].push for wave in waves])
     growth = _grown(inertia, push, at, np.append(rate, step), momentum=momentum)
     found = [Wave(*shape, float(f"{g:.2g}")) for shape, g in zip(shapes, growth, strict=True)]
     return sorted(found, key=lambda wave: -wave.growth)
-
-
-def _stacked(ends: Sequence[Ends]) -> tuple[Array, Array]:
-    return np.array([one.inertia for one in ends]), np.array([one.push for one in ends])
 
 
 def _grown(inertia: Array, push: Array, at: NDArray[np.bool_], start: Array, *, momentum: bool) -> Array:

@@ -66,7 +66,7 @@ def change_functions(
     omega, added, d = ca.SX.sym("omega", 3), ca.SX.sym("added", 3), ca.SX.sym("d", c.numel())
     before, after = parts_of(c), parts_of(d)
     kept, kept_after = (law.keeping(from_upper_triangle(parts["inertia"])) for parts in (before, after))
-    spin, spin_after = (_spin(parts) for parts in (before, after))
+    spin, spin_after = (spin_of(parts) for parts in (before, after))
     change = (kept_after - kept) @ omega + (spin_after - spin)
     full = from_upper_triangle(after["inertia"])
     return Change(
@@ -169,7 +169,7 @@ def each_motion(closing: ca.SX) -> ca.SX:
     return ca.vertcat(*(flag for flag in ca.vertsplit(closing) for _ in range(6)))
 
 
-def _spin(parts: Parts) -> ca.SX:
+def spin_of(parts: Parts) -> ca.SX:
     """Returns h, (3,) [N m s]: zero where no port moves."""
     return parts["momentum"][:3] if "momentum" in parts else ca.SX.zeros(3)
 

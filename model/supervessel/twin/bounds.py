@@ -13,7 +13,7 @@ from supervessel.rotation.error_bound.carried import kept_momentum, kept_rate
 from supervessel.rotation.error_bound.constants import constants_of, norm_of
 from supervessel.rotation.error_bound.functions import body_of, bound_after_step, keeps_in_truth
 from supervessel.rotation.error_bound.remainder import Remainder, remainder_of, step_error
-from supervessel.rotation.propagators import PROPAGATORS
+from supervessel.rotation.propagators import name_of
 from supervessel.rotation.propagators.taylor import taylor_order
 
 Parts = Mapping[str, ca.SX]
@@ -43,7 +43,7 @@ def method_remainder(model: Equations) -> Remainder | None:
     method, tolerance = model.plan.method, model.resolved.scene.rotation.tolerance
     if method is None:
         return None
-    name = next(name for name, row in PROPAGATORS.items() if row is method)
+    name = name_of(method)
     if name == "split":
         raise ValueError(
             'error_bound: propagator = "split" has no proven bound of its steps: must be another one'

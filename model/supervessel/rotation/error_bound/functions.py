@@ -6,7 +6,7 @@ s : of a sub-step, (4,): its length [s]; one more than the order of its Taylor s
     estimates of its error, [rad] and [rad/s]
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import casadi as ca
 
@@ -14,6 +14,7 @@ from supervessel.composite.inertia import from_upper_triangle
 from supervessel.composite.parts import CompositeGraph
 from supervessel.composite.resolved import ResolvedScene
 from supervessel.rotation.axes import AxesGraph
+from supervessel.rotation.changes import spin_of
 from supervessel.rotation.dynamics import Dynamics, dynamics_of
 from supervessel.rotation.error_bound.carried import (
     INFLATION,
@@ -35,7 +36,7 @@ from supervessel.rotation.error_bound.remainder import (
     remainder_of_taylor,
     step_error,
 )
-from supervessel.rotation.propagators import PROPAGATORS, Plan
+from supervessel.rotation.propagators import Plan, name_of
 from supervessel.rotation.propagators.method import Propagator
 from supervessel.scene.schema import Scene
 
@@ -98,11 +99,6 @@ def body_of(dynamics: Dynamics) -> TurnedBody:
     return TurnedBody(dynamics.inertia, dynamics.torque, spin)
 
 
-def spin_of(parts: Mapping[str, ca.SX]) -> ca.SX:
-    """Returns the angular momentum, (3,) [N m s], of parts that move relative to the body axes."""
-    return parts["momentum"][:3] if "momentum" in parts else ca.SX.zeros(3)
-
-
 def keeps_in_truth(scene: Scene) -> dict[str, str]:
     """Returns what changes keep, by their kind, in the motion that the bound is about: the law "tensor"."""
     rotation = scene.rotation.model_copy(update={"law": "tensor"})
@@ -127,7 +123,7 @@ def _step_error(
 
 def _remainder(method: Propagator, power: ca.SX) -> Remainder:
     """Returns the remainder of a method's steps, the power of a Taylor step's being an expression."""
-    name = next(name for name, row in PROPAGATORS.items() if row is method)
+    name = name_of(method)
     if name == "taylor":
         return remainder_of_taylor(power - 1.0)
     return UNKNOWN if name == "split" else remainder_of(name)

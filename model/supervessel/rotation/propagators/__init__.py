@@ -24,6 +24,11 @@ PROPAGATORS: dict[str, Propagator] = {
 """The methods; "auto" is a plan made of them."""
 
 
+def name_of(method: Propagator) -> str:
+    """Returns the name of a method of PROPAGATORS."""
+    return next(name for name, row in PROPAGATORS.items() if row is method)
+
+
 WHEN_FREE: dict[str, str] = {
     "never": "every_step",
     "always": "exact",
