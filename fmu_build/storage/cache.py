@@ -58,6 +58,9 @@ MEASURED_EVERY = 256
 UNUSED = 3600.0
 """Time without use [s] after which an older generation is removed; no compiler runs for half as long."""
 
+ASKED_FOR = 1.0
+"""Time [s] within which a program that asks whether a generation is in use has long had its answer."""
+
 LARGEST_FILE = 64 << 20
 """Size [bytes] that no kept result or library reaches; larger files are not read."""
 
@@ -255,13 +258,16 @@ def _is_private(folder: Path) -> bool:
 
 @contextmanager
 def in_use(generation: Path) -> Iterator[None]:
-    """Marks a generation as in use while a compiler works in it: `cache --clear` then leaves it."""
+    """Marks a generation as in use while a compiler works in it: `cache --clear` then leaves it.
+
+    Who asks `is_in_use` has the lock for a moment, which is waited for.
+    """
     file = open_lock(generation / LOCK)
     if file is None:  # it goes on without
         yield
         return
     try:
-        lock(file, shared=True)
+        lock(file, shared=True, wait=ASKED_FOR)
         yield
     finally:
         os.close(file)
@@ -382,11 +388,19 @@ def keep_bytes(place: Path, content: bytes) -> None:
         try:
             part.write(_digest(place, content) + content)
             part.close()
-            remove(place)
-            Path(part.name).replace(place)
+            _replace(place, Path(part.name))
         except OSError:
             Path(part.name).unlink()
             raise
+
+
+def _replace(place: Path, part: Path) -> None:
+    """Puts a file in the place of another, which is there until then, or of a folder."""
+    try:
+        part.replace(place)
+    except OSError:
+        remove(place)
+        part.replace(place)
 
 
 def read_bytes(place: Path) -> bytes | None:

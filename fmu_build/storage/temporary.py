@@ -11,6 +11,7 @@ import shutil
 import stat
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
@@ -116,17 +117,23 @@ def is_own(status: os.stat_result) -> bool:
     return os.name != "posix" or status.st_uid == os.geteuid()
 
 
-def lock(file: int, *, shared: bool = False) -> bool:
+def lock(file: int, *, shared: bool = False, wait: float = 0.0) -> bool:
     """Locks a file until it is closed, or its process ends; returns whether it is then locked so.
 
     shared : others may lock it so at the same time (on Windows nobody else may)
+    wait   : for how long others that have locked it are waited for [s] (on Windows they are not)
     It is not where another has locked it, or where the file system has no locks, as some network drives.
     """
-    try:
-        _lock(file, shared=shared)
-    except OSError:
-        return False
-    return True
+    until = time.monotonic() + (0.0 if sys.platform == "win32" else wait)
+    while True:
+        try:
+            _lock(file, shared=shared)
+        except OSError as error:
+            if error.errno not in LOCKED_BY_ANOTHER or time.monotonic() >= until:
+                return False
+        else:
+            return True
+        time.sleep(0.001)
 
 
 def is_locked(file: int) -> bool:

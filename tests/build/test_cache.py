@@ -7,7 +7,9 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -25,7 +27,7 @@ from fmu_build.storage.cache import FULL, LARGEST, OURS, TAG, TAG_TEXT, USED, ca
 from fmu_build.storage.compiler_files import FOLDER, RECORD
 from fmu_build.storage.temporary import temporary_folder
 from supervessel.__main__ import main
-from support import body, processes, scene
+from support import body, scene
 from support.processes import ROOT, needs_posix
 
 SCENE = 'name = "ball"\nroot = "B"\n[vessels.B]\nmass = 2.0\npmi = [1.0, 1.5, 2.0]\n'
@@ -554,24 +556,41 @@ def test_a_record_that_has_been_damaged_or_is_gone_is_not_believed(generation, c
         assert not compiler_files.is_changed(folder)
 
 
-def test_a_tests_cache_is_whole_though_another_worker_compiles_while_it_is_begun(tmp_path, monkeypatch):
-    common = tmp_path / "common" / FOLDER
-    common.mkdir(parents=True)
-    (common / "first").mkdir()
-    (common / "first" / "libm.o").write_bytes(b"1")
-    compiler_files.record(common)
+def test_a_kept_file_is_there_while_it_is_written_again(tmp_path):
+    """Who looks in between would take the compiler's folder for one that nobody has recorded."""
+    place = tmp_path / "kept"
+    caches.keep_bytes(place, b"0")
+    missing, ended = [], threading.Event()
 
-    def goes_on(file, new, *, linked):
-        shutil.copy2(file, new)
-        (common / "another").mkdir(exist_ok=True)
-        (common / "another" / "libm.o").write_bytes(b"2")
-        compiler_files.record(common)
+    def look():
+        while not ended.is_set():
+            missing.append(not os.path.lexists(place))
 
-    monkeypatch.setattr(processes, "_warm", lambda: common)
-    monkeypatch.setattr(processes, "_give", goes_on)
-    begun = tmp_path / "begun"
-    processes.begin_cache(begun)
-    assert not compiler_files.is_changed(processes.kept_in(begun) / FOLDER)
+    with ThreadPoolExecutor(1) as other:
+        looking = other.submit(look)
+        for number in range(2000):
+            caches.keep_bytes(place, b"%d" % number)
+        ended.set()
+        looking.result()
+    assert len(missing) > 1000
+    assert not any(missing)
+
+
+def test_a_kept_file_takes_the_place_of_a_folder(tmp_path):
+    place = tmp_path / "kept"
+    (place / "another").mkdir(parents=True)
+    caches.keep_bytes(place, b"content")
+    assert caches.read_bytes(place) == b"content"
+
+
+@needs_posix
+def test_a_compiler_is_known_to_be_at_work_though_another_asks_as_it_begins(generation):
+    asking = caches.open_lock(generation / caches.LOCK)
+    assert temporary.lock(asking)
+    threading.Timer(0.1, os.close, [asking]).start()
+    with caches.in_use(generation):
+        assert caches.is_in_use(generation)
+    assert not caches.is_in_use(generation)
 
 
 @needs_posix

@@ -4,7 +4,6 @@ A program inherits that a signal is ignored, as SIGINT is in a background job: `
 need, for their own process and for programs that they start.
 """
 
-import functools
 import os
 import shutil
 import signal
@@ -13,7 +12,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -21,8 +20,11 @@ import pytest
 from fmu_build.compile.compiler import FLAGS, TRIAL_FLAGS, compile_library
 from fmu_build.platforms import host_platform
 from fmu_build.storage.cache import OURS, cache_folder
-from fmu_build.storage.compiler_files import FOLDER, MANIFESTS, RECORD, UNFINISHED, compiler_folder, record
+from fmu_build.storage.compiler_files import FOLDER, MANIFESTS, RECORD, compiler_folder
 from support.pages import ROOT
+
+WARM = "SUPERVESSEL_TESTS_COMPILER"
+"""Variable for what `warm` returns, which workers of xdist inherit."""
 
 needs_posix = pytest.mark.skipif(os.name != "posix", reason="needs signals and ulimit")
 
@@ -61,45 +63,40 @@ def cache() -> Iterator[Path]:
 
 
 def begin_cache(cache: Path) -> None:
-    """Begins a cache with what the compiler has made for itself in the tests' common one.
+    """Begins a cache with what a compiler makes for itself before it compiles ours.
 
-    Files that it writes once are linked; its manifests are copied, before what they name: what a test does to
-    its own stays there.
+    Its files are linked, for it writes them once; its manifests are copied: what a test does to its own stays
+    there.
     """
-    common = _warm()
+    made = Path(os.environ[WARM] if WARM in os.environ else warm())
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SUPERVESSEL_CACHE", str(cache))
         own = cache_folder()
     assert own == kept_in(cache)
-    with suppress(FileNotFoundError):  # before what it lists: another worker's compiler goes on
-        shutil.copy2(common.with_name(RECORD), own / RECORD)
-    for kind in (MANIFESTS, *sorted({path.name for path in common.iterdir()} - {MANIFESTS, UNFINISHED})):
-        for place, _, names in os.walk(common / kind):
-            new = own / FOLDER / Path(place).relative_to(common)
-            new.mkdir(parents=True, exist_ok=True)
-            for name in names:
-                with suppress(FileNotFoundError):  # of another worker's compiler, which goes on
-                    _give(Path(place, name), new / name, linked=kind != MANIFESTS)
-    if not (own / RECORD).exists():  # the first compilers of all are still at work
-        record(own / FOLDER)
+    shutil.copy2(made.with_name(RECORD), own / RECORD)
+    give = os.link if os.name == "posix" else shutil.copy2
+    for kind in made.iterdir():
+        copy = shutil.copy2 if kind.name == MANIFESTS else give
+        shutil.copytree(kind, own / FOLDER / kind.name, copy_function=copy)
 
 
-def _give(file: Path, new: Path, *, linked: bool) -> None:
-    if linked and os.name == "posix":
-        os.link(file, new)
-    else:
-        shutil.copy2(file, new)
+def warm() -> str:
+    """Returns the folder of a compiler's own files that tests begin with, made once and then left alone.
 
-
-@functools.cache
-def _warm() -> Path:
-    """Returns the common folder of the compiler's own files, with what it makes before it compiles ours."""
-    with tempfile.TemporaryDirectory(prefix="supervessel-test-") as name:
+    The first process of a session makes it, before there are others. It stays for the next session.
+    """
+    folder = ROOT / "build" / "tests"
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        tempfile.TemporaryDirectory(prefix="supervessel-test-") as name,
+    ):
+        patch.setenv("SUPERVESSEL_CACHE", str(folder))
         source = Path(name, "small.c")
         source.write_text("int answer(void) { return 42; }\n")
         for flags in (FLAGS, TRIAL_FLAGS):
             compile_library([source], host_platform(), Path(name, "small"), flags)
-    return compiler_folder()
+        os.environ[WARM] = str(compiler_folder())
+    return os.environ[WARM]
 
 
 def kept_in(cache: Path) -> Path:
