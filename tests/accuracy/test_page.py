@@ -3,6 +3,8 @@
 import re
 import tomllib
 
+import pytest
+
 from fmu_build.accuracy import said
 from supervessel import choose, parse_scene
 from support import variant
@@ -37,6 +39,7 @@ def test_the_line_is_what_the_scene_gives():
     assert block[1] == said(choose(asked(None))[1])
 
 
+@pytest.mark.accuracy
 def test_the_table_is_what_the_scene_gives():
     rows = re.findall(r"^\| (\S+) \| `.*$", SECTION, re.MULTILINE)
     assert len(rows) == 4
