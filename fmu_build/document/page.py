@@ -22,7 +22,10 @@ from supervessel.composite.docks import joints, switchable
 from supervessel.composite.start import principal_moments
 from supervessel.drawing.geometry import Assembly
 from supervessel.rotation.propagators import description
-from supervessel.scene.schema import Scene, Vessel
+from supervessel.scene.schema import SAID, Scene, Vessel
+
+WORDS = {"license": "licence"}
+"""Words of the page for keys of a scene that are spelled otherwise."""
 
 TEMPLATE = Path(__file__).with_name("page.html")
 """The page's fixed text; $names stand where the scene's own go."""
@@ -94,7 +97,9 @@ def _whole(scene: Scene) -> str:
 def _facts(scene: Scene, fmi: int) -> str:
     """Returns the table of what the scene and the build have set."""
     rotation, experiment = scene.rotation, scene.experiment
+    said = ((WORDS.get(key, key), getattr(scene, key)) for key in SAID)
     rows: list[tuple[Cell, ...]] = [
+        *((word, text) for word, text in said if text is not None),
         ("FMI version", VERSIONS[fmi].name),
         ("made by", f"supervessel {version('supervessel')}"),
         ("root vessel", scene.root),

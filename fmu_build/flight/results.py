@@ -15,7 +15,7 @@ import supervessel
 from fmu_build.compile.compiler import compiler
 from fmu_build.storage.cache import place_of_result, read_file, remove
 from supervessel.problems import TradeError, printable
-from supervessel.scene.schema import Scene
+from supervessel.scene.schema import SAID, Scene
 from supervessel.shell.files import OutputError, write_file
 
 BUILT_WITH = ("casadi", "fmpy", "ziglang")
@@ -31,9 +31,11 @@ def place_of(kind: str, scene: Scene, what: Any) -> Path:
 
     kind : folder in the cache
     what : the question that the result answers, as JSON
-    The name is a digest of scene, question, this machine, versions, and the files of both packages.
+    The name is a digest of scene, question, this machine, versions, and the files of both packages. What a
+    scene says of itself, as its author and version, is no part of it.
     """
-    said = json.dumps([scene.model_dump(mode="json"), what, _maker()], sort_keys=True)
+    asked = scene.model_dump(mode="json", exclude=set(SAID))
+    said = json.dumps([asked, what, _maker()], sort_keys=True)
     return place_of_result(kind, said.encode())
 
 

@@ -8,7 +8,7 @@ from fmu_build.interface.units import UNITS, add_types, add_units
 from fmu_build.interface.variable_table import Dependency, Role, TableEntry
 from fmu_build.interface.xml_text import xml_text
 from fmu_build.versions import VERSIONS, Version
-from supervessel.scene.schema import Scene
+from supervessel.scene.schema import SAID, Scene
 
 LOG_ACCURACY = "logAccuracy"
 
@@ -75,7 +75,8 @@ def _header(scene: Scene, fmi: Version, token: str) -> ET.Element:
         "fmiVersion": fmi.name,
         "modelName": scene.name,
         fmi.token: token,
-        "description": _description(scene),
+        "description": scene.description or _description(scene),
+        **{key: said for key in SAID if key != "description" and (said := getattr(scene, key)) is not None},
         "generationTool": f"supervessel {version('supervessel')}",
         "variableNamingConvention": "structured",
     }
@@ -256,16 +257,14 @@ def _role(entry: TableEntry) -> dict[str, str]:
 
 
 def _type_attributes(entry: TableEntry) -> dict[str, str]:
-    """Returns type, unit, range and start of a variable, as both versions of FMI write them."""
+    """Returns type, range and start of a variable, as both versions of FMI write them.
+
+    Its unit and the unit for showing it are those of its type.
+    """
     variable = entry.variable
     if variable.boolean:
         return {"start": "true" if variable.start else "false"}
-    unit = UNITS[variable.unit]
-    attributes = {"declaredType": unit.type_name}
-    if variable.unit:
-        attributes["unit"] = variable.unit
-    if unit.display:
-        attributes["displayUnit"] = unit.display[0]
+    attributes = {"declaredType": UNITS[variable.unit].type_name}
     numbers = {"min": variable.low, "max": variable.high, "start": variable.start}
     if entry.nominal != 1.0:
         numbers["nominal"] = entry.nominal

@@ -23,6 +23,12 @@ TERMINAL_SIZE = 24.0  # in the same coordinates
 TERMINAL_ICON_SIZE = 64  # px
 CONNECTION_COLOUR = "34 34 34"
 
+VENDOR = "alt.supervessel"
+"""Beginning of the kinds of terminals, in reverse domain name notation.
+
+The top-level domain "alt" is kept for names outside the DNS, RFC 9476: no host is called so, now or later.
+"""
+
 
 @dataclass(frozen=True)
 class Terminal:
@@ -159,7 +165,7 @@ def _write(parent: ET.Element, terminal: Terminal, side: float, place: int, coun
         "Terminal",
         name=terminal.name,
         matchingRule=terminal.rule,
-        terminalKind=f"_supervessel_{terminal.kind}",
+        terminalKind=f"{VENDOR}.{terminal.kind}",
         description=terminal.description,
     )
     for entry in terminal.members:

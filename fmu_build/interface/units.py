@@ -45,13 +45,17 @@ UNITS = {
 }
 
 
+PURE = "1"
+"""The name in FMI of the unit of a pure number, which has none in the model."""
+
+
 def add_units(root: ET.Element, entries: Sequence[TableEntry]) -> None:
-    """Writes the units that variables have."""
-    used = {entry.variable.unit for entry in entries}
+    """Writes the units that variables have; a pure number has one without any exponent."""
+    used = _used(entries)
     definitions = ET.SubElement(root, "UnitDefinitions")
     for name, unit in UNITS.items():
-        if name and name in used:
-            element = ET.SubElement(definitions, "Unit", name=name)
+        if name in used:
+            element = ET.SubElement(definitions, "Unit", name=name or PURE)
             ET.SubElement(element, "BaseUnit", {base: str(power) for base, power in unit.exponents.items()})
             if unit.display:
                 display, factor = unit.display
@@ -63,17 +67,20 @@ def add_types(root: ET.Element, entries: Sequence[TableEntry], tag: str) -> None
 
     tag : name of a type's element; "SimpleType" of FMI 2.0 nests the attributes in an element of their own
     """
-    used = {entry.variable.unit for entry in entries}
+    used = _used(entries)
     definitions = ET.SubElement(root, "TypeDefinitions")
     for name, unit in UNITS.items():
         if name not in used:
             continue
-        attributes = {"quantity": unit.quantity}
-        if name:
-            attributes["unit"] = name
+        attributes = {"quantity": unit.quantity, "unit": name or PURE}
         if unit.display:
             attributes["displayUnit"] = unit.display[0]
         if tag == "SimpleType":
             ET.SubElement(ET.SubElement(definitions, tag, name=unit.type_name), "Real", attributes)
         else:
             ET.SubElement(definitions, tag, {"name": unit.type_name} | attributes)
+
+
+def _used(entries: Sequence[TableEntry]) -> set[str]:
+    """Returns the units of the variables that are numbers."""
+    return {entry.variable.unit for entry in entries if not entry.variable.boolean}

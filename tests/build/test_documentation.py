@@ -150,6 +150,15 @@ def test_the_page_gives_the_composite_that_the_reference_finds():
     assert pmi == pytest.approx([404.598, 683.188, 521.120], abs=1e-3)  # as examples/README.md prints them
 
 
+def test_the_page_says_what_the_scene_says_of_itself():
+    said = {"description": "A <ball>", "version": "1.2", "author": "A & B", "copyright": "C", "license": "D"}
+    scene = parse_scene(variant(body(), said))
+    table = rows(documentation(scene, variable_table(equations(scene)), 3)[INDEX])
+    found = [table[key][1] for key in ("description", "version", "author", "copyright", "licence")]
+    assert found == list(said.values())
+    assert not {"version", "author", "copyright", "licence"} & rows(made("iss")[2][INDEX]).keys()
+
+
 def test_the_page_lists_vessels_and_ports():
     table = rows(made("iss")[2][INDEX])
     assert "0.09, -17.9, 3.8" in table["ISS.P2"]
@@ -224,6 +233,16 @@ def test_terminals_fit_the_schema_and_name_what_is_there(name, fmi):
     assert all(variables[member] in ("input", "output") for member in members)
     for graphic in root.iter("TerminalGraphicalRepresentation"):
         assert f"terminalsAndIcons/{graphic.get('iconBaseName')}.png" in files
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_kinds_of_terminals_are_names_in_reverse_domain_notation_below_a_domain_that_no_host_has(name):
+    """RFC 9476 keeps "alt" for names outside the DNS; labels are those of RFC 1123, underscores allowed."""
+    scene, entries, _ = made(name)
+    root = etree.fromstring(terminals_and_icons(scene, entries, 3))
+    kinds = [terminal.get("terminalKind") for terminal in root.iter("Terminal")]
+    assert all(re.fullmatch(r"alt\.supervessel\.[a-z]+(_[a-z]+)*", kind) for kind in kinds), kinds
+    assert bool(kinds) == (name != "nothing_in")
 
 
 def test_terminals_are_the_ports_whose_pose_is_an_input_the_torque_and_the_attitude():

@@ -53,7 +53,14 @@ MISSING = [
     ),
 ]
 
+LINE = "must be a line of 1 to 200 printable characters in quotes"
+
 WRONG_TYPES = [
+    case("version a number", {"version": 1.0}, f"version = 1.0: {LINE}"),
+    case("author empty", {"author": ""}, f'author = "": {LINE}'),
+    case("license of spaces", {"license": "  "}, f'license = "  ": {LINE}'),
+    case("description of two lines", {"description": "a\nb"}, f'description = "a\\nb": {LINE}'),
+    case("copyright a list", {"copyright": ["a"]}, f'copyright = ["a"]: {LINE}'),
     case("root a number", {"root": 3}, "root = 3: must be a name in quotes"),
     case("name a Boolean", {"name": True}, "name = true: must be a name in quotes"),
     case("vessel a number", {"vessels": {"B": 3.0}}, "vessels.B = 3.0: must be a table", base=body()),

@@ -128,3 +128,18 @@ def start_of(raw: Mapping[str, Any], name: str) -> float:
     table = raw["vessels"][vessel]
     value = (table["ports"][port[0]] if port else table)[key]
     return float(value[int(index) - 1] if index else value)
+
+
+def types(raw: Mapping[str, Any], fmi: int) -> dict[str, dict[str, str]]:
+    """Returns the attributes of each declared type by name, laid out alike for both versions."""
+    elements = xml(raw, fmi).find("TypeDefinitions")
+    return {e.get("name"): dict((e[0] if fmi == 2 else e).attrib) for e in elements}
+
+
+def measured_in(raw: Mapping[str, Any], fmi: int, attribute: str = "unit") -> dict[str, str | None]:
+    """Returns the unit, or the displayUnit, of each variable by name: its own, else that of its type."""
+    declared = types(raw, fmi)
+    return {
+        name: v.get(attribute, declared.get(v.get("declaredType"), {}).get(attribute))
+        for name, v in variables(raw, fmi).items()
+    }

@@ -76,7 +76,7 @@ def test_the_description_is_valid_and_says_that_the_input_is_discrete(fmi, raw):
     instance.free()
     assert (variable.type, variable.causality, variable.variability) == ("Boolean", "input", "discrete")
     assert variable.start == ("true" if raw is DOCKING else "false")
-    assert variable.unit is None
+    assert (variable.unit, variable.declaredType) == (None, None)
 
 
 @pytest.mark.parametrize(("raw", "claimed"), [(DOCKING, True), (ISS_DG, False)], ids=["docks", "none"])

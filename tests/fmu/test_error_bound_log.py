@@ -184,7 +184,7 @@ def test_a_category_that_is_not_declared_is_refused(fmi):
 def test_its_error_is_named_where_it_is_shown(fmi, exchange):
     instance = Instance(SHOWN, fmi, exchange=exchange, optimised=False)
     [variable] = [v for v in instance.description.modelVariables if v.name == "error_bound"]
-    assert (variable.causality, variable.unit) == ("output", "rad")
+    assert (variable.causality, variable.declaredType.unit) == ("output", "rad")
     instance.free()
 
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from ctypes import c_double
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -18,17 +19,20 @@ from fmu.descriptions import (
     RATES,
     SCENE,
     input_names,
+    measured_in,
     output_names,
     start_of,
+    types,
     variables,
     xml,
 )
 from supervessel import reference
-from support import EPS, ISS_DG, PARAMETERS, STATES, Instance, built, flying, scene
+from support import EPS, ISS_DG, PARAMETERS, STATES, Instance, body, built, flying, scene, variant
 from support.marks import FMI
 
 # SI exponents, from the definitions N = kg m/s2 and J = N m.
 UNITS = {
+    "1": {},
     "s": {"s": 1},
     "kg": {"kg": 1},
     "m": {"m": 1},
@@ -46,20 +50,20 @@ UNIT_OF = {
     "mass": "kg",
     "pmi": "m2",
     "position": "m",
-    "direction": None,
-    "alignment": None,
+    "direction": "1",
+    "alignment": "1",
     "torque": "N.m",
     "angular_velocity_start": "rad/s",
-    "attitude_start": None,
+    "attitude_start": "1",
     "barycentre": "m",
     "inertia": "kg.m2",
     "angular_velocity": "rad/s",
-    "attitude": None,
+    "attitude": "1",
     "kinetic_energy": "J",
     "angular_momentum": "N.m.s",
 }
 
-UNIT_OF_RATE = {None: "1/s", "rad/s": "rad/s2"}
+UNIT_OF_RATE = {"1": "1/s", "rad/s": "rad/s2"}
 DISPLAY = {"rad/s": "deg/s", "rad/s2": "deg/s2"}
 
 
@@ -150,10 +154,10 @@ def test_value_references_are_unique(raw, fmi):
 @FMI
 @SCENE
 def test_units_are_those_of_the_interface(raw, fmi):
-    for name, variable in variables(raw, fmi).items():
+    for name, unit in measured_in(raw, fmi).items():
         inner = name.removeprefix("der(")
-        unit = UNIT_OF[inner.partition("[")[0].rpartition(".")[2]]
-        assert variable.get("unit") == (unit if inner == name else UNIT_OF_RATE[unit]), name
+        expected = UNIT_OF[inner.partition("[")[0].rpartition(".")[2]]
+        assert unit == (expected if inner == name else UNIT_OF_RATE[expected]), name
 
 
 @FMI
@@ -163,8 +167,7 @@ def test_each_unit_used_is_defined_by_its_si_exponents(raw, fmi):
         unit.get("name"): {base: int(power) for base, power in unit.find("BaseUnit").attrib.items()}
         for unit in xml(raw, fmi).find("UnitDefinitions")
     }
-    used = {v["unit"] for v in variables(raw, fmi).values() if "unit" in v}
-    assert defined == {unit: UNITS[unit] for unit in used}
+    assert defined == {unit: UNITS[unit] for unit in measured_in(raw, fmi).values()}
 
 
 @FMI
@@ -178,31 +181,64 @@ def test_angles_are_displayed_in_degrees(raw, fmi):
     assert displays == {
         unit: [{"name": DISPLAY[unit], "factor": factor}] if unit in DISPLAY else [] for unit in displays
     }
-    for name, variable in variables(raw, fmi).items():
-        assert variable.get("displayUnit") == DISPLAY.get(variable.get("unit")), name
+    units, shown = measured_in(raw, fmi), measured_in(raw, fmi, "displayUnit")
+    assert shown == {name: DISPLAY.get(unit) for name, unit in units.items()}
 
 
 @FMI
 @SCENE
-def test_each_variable_is_of_a_declared_type_with_its_unit(raw, fmi):
-    types = {
-        element.get("name"): dict((element[0] if fmi == 2 else element).attrib)
-        for element in xml(raw, fmi).find("TypeDefinitions")
-    }
-    found = variables(raw, fmi)
-    assert {v["declaredType"] for v in found.values()} == set(types)
-    for name, variable in found.items():
-        declared = types[variable["declaredType"]]
-        for attribute in ("unit", "displayUnit"):
-            assert declared.get(attribute) == variable.get(attribute), name
-        assert declared["quantity"]
+def test_each_variable_is_of_a_declared_type_and_leaves_units_to_it(raw, fmi):
+    declared, found = types(raw, fmi), variables(raw, fmi)
+    assert {v["declaredType"] for v in found.values()} == set(declared)
+    assert all(kind["unit"] and kind["quantity"] for kind in declared.values())
+    assert not any({"unit", "displayUnit", "quantity"} & v.keys() for v in found.values())
+
+
+@FMI
+@SCENE
+def test_an_importer_reads_the_unit_of_each_variable(raw, fmi):
+    """By FMPy's reader: that of the variable's type."""
+    read = fmpy.read_model_description(str(built(raw, fmi))).modelVariables
+    assert {v.name: v.declaredType.unit for v in read} == measured_in(raw, fmi)
 
 
 @FMI
 @SCENE
 def test_variables_of_one_type_are_those_of_one_unit_and_quantity(raw, fmi):
-    units = {(v["declaredType"], v.get("unit")) for v in variables(raw, fmi).values()}
-    assert len(units) == len({kind for kind, _ in units}) == len({unit for _, unit in units})
+    declared = types(raw, fmi)
+    assert len({kind["unit"] for kind in declared.values()}) == len(declared)
+
+
+SAID = {
+    "description": "Two vessels & a <dock>",
+    "version": "2.1.0-rc.1",
+    "author": 'A. "B" C',
+    "copyright": "© 2026 D",
+    "license": "CC-BY-4.0",
+}
+
+
+@FMI
+def test_what_a_scene_says_of_itself_stands_in_the_description_word_for_word(raw_said, fmi, tmp_path):
+    root = xml(raw_said, fmi)
+    assert {key: root.get(key) for key in SAID} == SAID
+    read = fmpy.read_model_description(str(built(raw_said, fmi)))
+    found = (read.description, read.version, read.author, read.copyright, read.license)
+    assert found == tuple(SAID[key] for key in ("description", "version", "author", "copyright", "license"))
+    assert strict_schema(fmi, tmp_path).validate(root)
+
+
+@pytest.fixture(scope="module")
+def raw_said() -> dict[str, Any]:
+    """A scene that says everything of itself that it can."""
+    return variant(body(), {"name": "said", **SAID})
+
+
+@FMI
+def test_a_scene_that_says_nothing_of_itself_has_no_attribute_of_it(fmi):
+    root = xml(ISS_DG, fmi)
+    assert [key for key in SAID if root.get(key) is not None] == ["description"]
+    assert root.get("generationTool") == f"supervessel {version('supervessel')}"
 
 
 HALF_A_DIGIT = 0.5e-2 * (1.0 + 16 * EPS)

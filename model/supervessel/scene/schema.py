@@ -42,6 +42,10 @@ MOST_STEPS = 1_000_000
 """Most communication steps of an experiment: each moving input takes eight bytes a step."""
 
 
+LONGEST_SAID = 200
+"""Most characters of what a scene says of itself as a model: importers show it in a line."""
+
+
 class Table(BaseModel):
     """A table of a scene file: unknown keys are refused, values never change once read."""
 
@@ -66,6 +70,14 @@ def _flag(value: object) -> object:
     raise ValueError(f" = {quantity(value)}: must be true or false")
 
 
+def _said(value: object) -> object:
+    if isinstance(value, str) and value.strip() and len(value) <= LONGEST_SAID and value.isprintable():
+        return value
+    raise ValueError(
+        f" = {quantity(value)}: must be a line of 1 to {LONGEST_SAID} printable characters in quotes"
+    )
+
+
 def _one_of(*allowed: str) -> BeforeValidator:
     def check(value: object) -> object:
         if value in allowed:
@@ -78,6 +90,7 @@ def _one_of(*allowed: str) -> BeforeValidator:
 Name = Annotated[str, BeforeValidator(_text)]
 Names = Annotated[tuple[str, ...], BeforeValidator(_names)]
 Flag = Annotated[bool, BeforeValidator(_flag)]
+Said = Annotated[str, BeforeValidator(_said)]
 Convention = Literal["rigid_body", "orbiter"]
 Law = Literal["none", "decoupled", "principal", "tensor"]
 Kept = Literal["rate", "momentum"]
@@ -223,6 +236,8 @@ class Outputs(Table):
 class Scene(Table):
     """A docked assembly. Made by `load_scene` or `parse_scene`, which check it as a whole.
 
+    Description, version, author, copyright and license are what the FMU says of itself as a model, word for
+    word; None: nothing, of the description a line that names vessels and law.
     Under the convention "orbiter" the composite is that of the Orbiter simulator, for comparison: moments
     that no rigid body has are taken by the absolute values of [CV] eqs. (3-5), and of the composite's tensor
     the diagonal alone is kept.
@@ -233,6 +248,11 @@ class Scene(Table):
     """
 
     name: Name
+    description: Said | None = None
+    version: Said | None = None
+    author: Said | None = None
+    copyright: Said | None = None
+    license: Said | None = None
     root: Name
     convention: Annotated[Convention, _one_of(*get_args(Convention))] = "rigid_body"
     vessels: dict[str, Vessel]
@@ -311,6 +331,9 @@ def keeps_momentum(scene: Scene) -> bool:
     """Whether every change that inputs can make keeps momentum: it is then the state of model exchange."""
     return set(scene.keeps.values()) == {"momentum"}
 
+
+SAID = ("description", "version", "author", "copyright", "license")
+"""Keys of a scene that tell of the model and change no number."""
 
 CHOSEN = ("law", "propagator", "tolerance", "max_angle_step")
 """Keys of `[rotation]` that are chosen where a scene has `[accuracy]`."""
