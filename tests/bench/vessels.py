@@ -129,7 +129,7 @@ def casadi_create(unpacked: str, torque_alone: bool) -> float:
     for name in builder.u() if torque_alone else ():
         if not name.startswith("torque"):
             builder.set_category(name, "p")
-    builder.create("rate", ["x", "u"], ["ode"])
+    builder.create("rate", ["x", "u"], ["ode"], {"enable_reverse": False})
     return time.perf_counter() - begun
 
 
