@@ -14,10 +14,12 @@ from fmu_build.document.reference_result import reference_result
 from fmu_build.errors import BuildError
 from fmu_build.generate.model import generated
 from fmu_build.generate.sources import source_file_names, source_files
+from fmu_build.interface.names import Naming, check_names, check_naming
 from fmu_build.interface.terminals import terminals_and_icons
 from fmu_build.interface.variable_table import TableEntry, variable_table
 from fmu_build.platforms import Platform, host_platform
 from fmu_build.versions import NEWEST, check_version
+from supervessel.composite.resolved import resolve
 from supervessel.equations import Equations, equations
 from supervessel.problems import TradeError
 from supervessel.scene.schema import Scene
@@ -29,7 +31,11 @@ ARCHIVE_TIME = (1980, 1, 1, 0, 0, 0)
 
 
 def build_fmu(
-    scene: Scene, output: str | Path, fmi: int = NEWEST, platforms: Sequence[Platform] = ()
+    scene: Scene,
+    output: str | Path,
+    fmi: int = NEWEST,
+    platforms: Sequence[Platform] = (),
+    names: Naming = "structured",
 ) -> Path:
     """Builds the FMU of a scene and returns its path.
 
@@ -38,9 +44,10 @@ def build_fmu(
                 anything else that is there, and is not empty, is refused (see `supervessel.shell.files`)
     fmi       : version of the FMI standard, of `fmu_build.versions.VERSIONS`
     platforms : to compile for, of `fmu_build.platforms.PLATFORMS`; none: this machine's
+    names     : of the FMU's variables, "structured" as in scene and twin, or "flat": DG_nose_position_1
     A scene with `[accuracy]` is built as `supervessel.choose` finds it; the evidence is in the archive.
-    Raises BuildError if the compiler fails, the file cannot be written, or nothing is as exact as the scene
-    asks, ValueError for another `fmi`.
+    Raises BuildError if the compiler fails, the file cannot be written, nothing is as exact as the scene
+    asks, or two variables would have one flat name; ValueError for another `fmi` or another naming.
 
     Example:
         >>> from fmu_build import build_fmu
@@ -48,17 +55,19 @@ def build_fmu(
         'iss_dg.fmu'
     """
     check_version(fmi)
+    check_naming(names)
     output = Path(output)
     check_fmu_output(output)
+    check_names(resolve(scene), names)  # before anything is chosen, which takes time
     platforms = platforms or (host_platform(),)
     scene, evidence = _chosen(scene)
     model = equations(scene)
-    entries = variable_table(model)
+    entries = variable_table(model, names)
     sources, description = generated(model, entries, fmi)
     packed = source_files(sources, fmi, scene.name)
     with Workers(1) as aside:  # the compiler is a process of its own
-        names = source_file_names(sources, fmi)
-        binaries = aside.submit(compile_sources, packed, names, fmi, platforms, scene.name)
+        compiled = source_file_names(sources, fmi)
+        binaries = aside.submit(compile_sources, packed, compiled, fmi, platforms, scene.name)
         beside = companions(model, entries, fmi, evidence)
     check_fmu_output(output)  # something else may have come there in the meantime
     content = {"modelDescription.xml": description, **packed, **binaries.result(), **beside}
@@ -92,7 +101,7 @@ def companions(
         **documentation(scene, entries, fmi, evidence),
         **shown,
         "terminalsAndIcons/terminalsAndIcons.xml": terminals_and_icons(scene, entries, fmi),
-        **reference_result(model),
+        **reference_result(model, entries),
     }
 
 

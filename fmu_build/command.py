@@ -1,4 +1,4 @@
-"""The command python -m fmu_build SCENE.toml [-o OUT.fmu] [--fmi VERSION] [--platform NAME ...|all]."""
+"""The command python -m fmu_build SCENE.toml [-o OUT.fmu] [--fmi N] [--platform NAME] [--names NAMING]."""
 
 import argparse
 from collections.abc import Sequence
@@ -6,6 +6,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from fmu_build.interface.names import NAMINGS
 from fmu_build.platforms import PLATFORMS, Platform, platforms_named
 from fmu_build.versions import NEWEST, VERSIONS
 from supervessel.problems import printable
@@ -41,6 +42,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         metavar="NAME",
         help=f"to compile for (default: this machine's): {', '.join(p.name for p in PLATFORMS)}; or all",
     )
+    parser.add_argument(
+        "--names",
+        choices=NAMINGS,
+        default=NAMINGS[0],
+        help="of the FMU's variables: DG.nose.position[1], or flat DG_nose_position_1 (default: %(default)s)",
+    )
     options = parser.parse_args(arguments)
     try:
         platforms = platforms_named(options.platform)
@@ -61,7 +68,7 @@ def _build(options: argparse.Namespace, platforms: Sequence[Platform]) -> int:
         output = options.output or Path(f"{scene.name}.fmu")
         check_fmu_output(output, [options.scene])
         chosen = _choose(scene) if scene.accuracy else []
-        build_fmu(scene, output, options.fmi, platforms)
+        build_fmu(scene, output, options.fmi, platforms, options.names)
     except (SceneError, BuildError) as error:
         print_problem(error)
         return 1

@@ -26,11 +26,6 @@ static Status check_mass(Instance *instance, const Variable *variable, const dou
     return instance_refuse(instance, "%s = %.10g kg: must be >= 0", variable->name, *mass);
 }
 
-/* Length of the name of a vector without its index. */
-static int group_length(const Variable *element) {
-    return (int)strcspn(element->name, "[");
-}
-
 enum { NUMBER_SIZE = 32 };
 
 /* Writes a number with as many digits as tell it from its neighbours. */

@@ -11,7 +11,7 @@ static Status refuse_action(Instance *instance) {
         const double *v = &instance->now.values[i];
         if (v[0] == 0.0 && v[1] == 0.0 && v[2] == 0.0) continue;
         const Variable *variable = &VARIABLES[i];
-        return instance_refuse(instance, "%.*s = (%.10g, %.10g, %.10g) %s: %s", (int)strcspn(variable->name, "["),
+        return instance_refuse(instance, "%.*s = (%.10g, %.10g, %.10g) %s: %s", group_length(variable),
                                variable->name, v[0], v[1], v[2], variable->unit, reason);
     }
     if (!SPINS) return STATUS_OK;

@@ -2,6 +2,8 @@
 #ifndef VARIABLE_TABLE_H
 #define VARIABLE_TABLE_H
 
+#include <string.h>
+
 #include "scene.h"
 
 typedef enum { TYPE_NUMBER, TYPE_BOOLEAN } Type;
@@ -35,6 +37,11 @@ typedef struct {
     unsigned follows;
     Type type; /* the values of a Boolean are 0 and 1 */
 } Variable;
+
+/* Length of the name of a vector without the index of an element. */
+static inline int group_length(const Variable *element) {
+    return (int)(strrchr(element->name, INDEX_MARK) - element->name);
+}
 
 /* A check and the value reference at which it stands; the last one is CHECK_NONE. */
 typedef struct {

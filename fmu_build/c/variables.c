@@ -35,9 +35,10 @@ Status instance_check_attitude(Instance *instance) {
     changes_mirror(instance);
     const double *q = instance_x(instance);
     const double square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+    const Variable *attitude = &VARIABLES[REFERENCE_STATES];
     if (!(square >= SMALLEST_SQUARE && square <= LARGEST_SQUARE))
-        return instance_refuse(instance, "state.attitude = (%.10g, %.10g, %.10g, %.10g): its length must be about 1",
-                               q[0], q[1], q[2], q[3]);
+        return instance_refuse(instance, "%.*s = (%.10g, %.10g, %.10g, %.10g): its length must be about 1",
+                               group_length(attitude), attitude->name, q[0], q[1], q[2], q[3]);
     return STATUS_OK;
 }
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from fmu_build.document.accuracy_text import accuracy_text
 from fmu_build.document.rotation_text import energy_and_momentum, law_equation, law_text, what_changes_keep
 from fmu_build.document.tables import Cell, number_text, rounded, table
+from fmu_build.interface.names import Naming
 from fmu_build.interface.variable_table import Role, TableEntry
 from fmu_build.versions import VERSIONS
 from supervessel.composite.docks import joints, switchable
@@ -29,6 +30,13 @@ WORDS = {"license": "licence"}
 
 TEMPLATE = Path(__file__).with_name("page.html")
 """The page's fixed text; $names stand where the scene's own go."""
+
+NAMINGS_SAID: dict[Naming, str] = {
+    "structured": "Scalars with structured names, the same in FMI 2.0 and FMI 3.0.",
+    "flat": "Scalars with flat names, the same in FMI 2.0 and FMI 3.0; in the last column the names that "
+    "scene file and twin have for them.",
+}
+"""What the page says of the names of variables."""
 
 ROLE_TITLES: dict[Role, tuple[str, str]] = {
     "time": ("Independent variable", ""),
@@ -72,6 +80,7 @@ def page(
         vessels=_vessels(parts),
         ports=_ports(scene) + _points(scene),
         composite=_composite(parts.whole),
+        naming=NAMINGS_SAID[entries[0].naming],
         variables=_variables(entries),
         law=escape(rotation.law),
         law_equation=law_equation(scene),
@@ -187,8 +196,8 @@ def _composite(whole: Mapping[str, NDArray[np.float64]]) -> str:
 
 def _variables(entries: Sequence[TableEntry]) -> str:
     """Returns a table of variables for each role."""
-    text = ""
-    head = ("reference", "name", "unit", "start", "range", "description")
+    text, traced = "", ("scene and twin",) if entries[0].naming == "flat" else ()
+    head = ("reference", "name", "unit", "start", "range", "description", *traced)
     for role, (title, remark) in ROLE_TITLES.items():
         rows: list[tuple[Cell, ...]] = [_variable(entry) for entry in entries if entry.role == role]
         if rows:
@@ -201,4 +210,5 @@ def _variable(entry: TableEntry) -> tuple[Cell, ...]:
     start = "" if variable.start is None else variable.start
     bounds = ((variable.low, "≥"), (variable.high, "≤"))
     span = ", ".join(f"{sign} {number_text(bound)}" for bound, sign in bounds if bound is not None)
-    return entry.reference, variable.name, variable.unit, start, span, variable.description
+    traced = (variable.name,) if entry.naming == "flat" else ()
+    return entry.reference, entry.name, variable.unit, start, span, variable.description, *traced

@@ -13,6 +13,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
+from fmu_build.interface.variable_table import TableEntry
 from fmu_build.interface.xml_text import xml_text
 from supervessel.equations import Equations, composite_slices, p_start
 from supervessel.scene.inputs import MASS, TORQUE
@@ -29,9 +30,10 @@ ATTEMPTS = 8
 Array = NDArray[np.float64]
 
 
-def reference_result(model: Equations) -> dict[str, bytes]:
+def reference_result(model: Equations, entries: Sequence[TableEntry]) -> dict[str, bytes]:
     """Returns the files of the reference result by their paths in the archive.
 
+    entries : the variable table
     Fifty steps from the scene's start, inputs moving linearly: masses lose up to a tenth within their
     range, unless that would change the rate, the torque grows to what would double the rate at the start, or
     give 0.01 rad/s; everything else stays. The steps are the
@@ -56,13 +58,13 @@ def reference_result(model: Equations) -> dict[str, bytes]:
     else:
         return {}
     ends = np.column_stack([times[[0, -1]], np.vstack([first, last])])
-    outputs = resolved.output_names
-    booleans = frozenset(variable.name for variable in inputs if variable.boolean)
+    names = {role: [entry.name for entry in entries if entry.role == role] for role in ("input", "output")}
+    booleans = frozenset(entry.name for entry in entries if entry.variable.boolean)
     return {
         f"{FOLDER}/fmi-ls-manifest.xml": _manifest(),
         f"{FOLDER}/experiments.xml": _experiments(step, float(times[-1])),
-        f"{FOLDER}/inputs.csv": _csv([variable.name for variable in inputs], ends, booleans),
-        f"{FOLDER}/outputs.csv": _csv(outputs, np.column_stack([times, results])),
+        f"{FOLDER}/inputs.csv": _csv(names["input"], ends, booleans),
+        f"{FOLDER}/outputs.csv": _csv(names["output"], np.column_stack([times, results])),
     }
 
 

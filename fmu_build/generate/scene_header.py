@@ -7,6 +7,7 @@ import casadi as ca
 from fmu_build.generate.change_tables import change_constants
 from fmu_build.generate.vessel_loop import LoopTables, loop_constants
 from fmu_build.interface.model_description import LOG_CATEGORIES, tells_accuracy
+from fmu_build.interface.names import INDEX_MARKS
 from fmu_build.interface.variable_table import TableEntry
 from supervessel.equations import Equations
 from supervessel.rotation.error_bound.functions import keeps_in_truth
@@ -49,6 +50,7 @@ def scene_header(
         **_bound(model),
         **_plan(model),
         **_limits(model.resolved.scene),
+        "INDEX_MARK": f"'{INDEX_MARKS[entries[0].naming]}'",
     }
     return (
         "/* Generated: what the C layer must know of the scene. */\n"

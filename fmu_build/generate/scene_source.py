@@ -57,7 +57,7 @@ def _row(entry: TableEntry, needs: Mapping[int, frozenset[str]]) -> str:
     }
     flags = sorted(own.get(entry.role, frozenset()).union(*(needs[d.reference] for d in entry.dependencies)))
     fields = [
-        f'"{variable.name}"',
+        f'"{entry.name}"',
         f'"{variable.unit}"',
         repr(variable.start or 0.0),
         repr(entry.nominal),

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from xml.etree import ElementTree as ET
 
+from fmu_build.interface.names import Naming
 from fmu_build.interface.units import UNITS, add_types, add_units
 from fmu_build.interface.variable_table import Dependency, Role, TableEntry
 from fmu_build.interface.xml_text import xml_text
@@ -64,12 +65,12 @@ def model_description(
     sources : names of the C files in sources/, which FMI 2.0 lists here
     """
     version_of_fmi = VERSIONS[fmi]
-    root = _header(scene, version_of_fmi, token)
+    root = _header(scene, version_of_fmi, token, entries[0].naming)
     WRITERS[fmi](root, scene, entries, sources if version_of_fmi.lists_sources else ())
     return xml_text(root)
 
 
-def _header(scene: Scene, fmi: Version, token: str) -> ET.Element:
+def _header(scene: Scene, fmi: Version, token: str, naming: Naming) -> ET.Element:
     """Returns the root element."""
     attributes = {
         "fmiVersion": fmi.name,
@@ -78,7 +79,7 @@ def _header(scene: Scene, fmi: Version, token: str) -> ET.Element:
         "description": scene.description or _description(scene),
         **{key: said for key in SAID if key != "description" and (said := getattr(scene, key)) is not None},
         "generationTool": f"supervessel {version('supervessel')}",
-        "variableNamingConvention": "structured",
+        "variableNamingConvention": naming,
     }
     return ET.Element("fmiModelDescription", attributes)
 
@@ -245,7 +246,7 @@ def _experiment(root: ET.Element, scene: Scene) -> None:
 
 def _identity(entry: TableEntry) -> dict[str, str]:
     return {
-        "name": entry.variable.name,
+        "name": entry.name,
         "valueReference": str(entry.reference),
         "description": entry.variable.description,
     }

@@ -39,7 +39,8 @@ class Terminal:
     rule        : "plug" where a connection needs all members, "bus" where some members are enough
     description : for people
     members     : its variables
-    prefix      : beginning of the variables' names that the members' names leave out
+    prefix      : beginning of the variables' structured names that the members' names leave out; a member's
+                  name is the same whatever names the FMU's variables have, so that any two FMUs connect
     """
 
     name: str
@@ -169,10 +170,9 @@ def _write(parent: ET.Element, terminal: Terminal, side: float, place: int, coun
         description=terminal.description,
     )
     for entry in terminal.members:
-        name = entry.variable.name
         attributes = {
-            "variableName": name,
-            "memberName": name.removeprefix(terminal.prefix),
+            "variableName": entry.name,
+            "memberName": entry.variable.name.removeprefix(terminal.prefix),
             "variableKind": "signal",
         }
         ET.SubElement(element, "TerminalMemberVariable", attributes)

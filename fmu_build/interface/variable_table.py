@@ -11,6 +11,8 @@ from typing import Literal
 import casadi as ca
 
 from fmu_build.generate.vessel_loop import LONGEST_CODE
+from fmu_build.interface import names as fmu_names
+from fmu_build.interface.names import Naming, check_names, flat
 from fmu_build.interface.nominals import magnitudes_at_start, nominal_of
 from supervessel.equations import Equations
 from supervessel.scene.schema import keeps_momentum
@@ -36,12 +38,13 @@ class Dependency:
 class TableEntry:
     """A variable of the FMU.
 
-    variable     : name, unit, start value and the like
+    variable     : unit, start value and the like, and the name that scene and twin have for it
     reference    : value reference, the variable's place in the table
     role         : time, input, parameter, output, state or derivative
     nominal      : its magnitude, for an importer's solver
     dependencies : inputs and states that an output or a derivative depends on
     initial      : inputs and start parameters that an output, a state or a derivative depends on at the start
+    naming       : of the whole table
     """
 
     variable: Variable
@@ -50,17 +53,28 @@ class TableEntry:
     nominal: float = 1.0
     dependencies: tuple[Dependency, ...] = ()
     initial: tuple[Dependency, ...] = ()
+    naming: Naming = "structured"
+
+    @property
+    def name(self) -> str:
+        """The variable's name in the FMU: what stands in its files and its messages."""
+        return flat(self.variable.name) if self.naming == "flat" else self.variable.name
 
 
 Rows = dict[Role, list[tuple[Dependency, ...]]]
 """By role, the dependencies of each variable of that role."""
 
-TIME = Variable("time", "s", "simulation time")
+TIME = Variable(fmu_names.TIME, "s", "simulation time")
 
 
-def variable_table(model: Equations) -> tuple[TableEntry, ...]:
-    """Returns the variables: time, inputs (p, then torque), start parameters, outputs, states, rates."""
+def variable_table(model: Equations, naming: Naming = "structured") -> tuple[TableEntry, ...]:
+    """Returns the variables: time, inputs (p, then torque), start parameters, outputs, states, rates.
+
+    naming : of the FMU's names
+    Raises BuildError where two variables would have one name.
+    """
     resolved = model.resolved
+    check_names(resolved, naming)
     groups: dict[Role, Sequence[Variable]] = {
         "time": (TIME,),
         "input": resolved.inputs,
@@ -83,7 +97,7 @@ def variable_table(model: Equations) -> tuple[TableEntry, ...]:
             start = at_start[role][i] if role in at_start else ()
             initial = _at_start(start, first["state"], first["parameter"])
             nominal = nominal_of(variable, whole)
-            entries.append(TableEntry(variable, first[role] + i, role, nominal, now, initial))
+            entries.append(TableEntry(variable, first[role] + i, role, nominal, now, initial, naming))
     return tuple(entries)
 
 

@@ -76,6 +76,35 @@ def test_the_fmi_version_is_3_unless_told(folder, options, version):
     assert read_model_description(str(folder / "ball.fmu")).fmiVersion == version
 
 
+def test_names_are_structured_unless_told(folder):
+    for options, rate in ([], "angular_velocity[1]"), (["--names", "flat"], "angular_velocity_1"):
+        assert run(folder, "ball.toml", *options).returncode == 0
+        assert rate in [v.name for v in read_model_description(str(folder / "ball.fmu")).modelVariables]
+
+
+def test_names_that_would_be_one_are_a_failure_that_tells_both(folder):
+    ports = "".join(
+        f"[vessels.B.ports.{p}]\nposition = [0, 0, 0]\ndirection = [1, 0, 0]\nalignment = [0, 1, 0]\n"
+        for p in ("C_d", "e")
+    )
+    other = "[vessels.B_C]\nmass = 1.0\npmi = [1.0, 1.0, 1.0]\n" + ports.replace("C_d", "d").replace(
+        "B.", "B_C."
+    )
+    docks = "".join(f'[[docks]]\nports = ["B.{one}", "B_C.{two}"]\n' for one, two in [("C_d", "d")])
+    text = BALL + ports + other + docks + '[inputs]\npose = ["B.C_d", "B_C.d"]\n'
+    (folder / "pair.toml").write_text(text)
+    done = run(folder, "pair.toml", "--names", "flat")
+    assert_failed(
+        done,
+        *(
+            f"ball: flat names: B.C_d.{key}[{i}] and B_C.d.{key}[{i}] would both be B_C_d_{key}_{i}; "
+            "rename a part of one of them"
+            for key in ("position", "direction", "alignment")
+            for i in (1, 2, 3)
+        ),
+    )
+
+
 def test_help_is_a_result_on_stdout(folder):
     done = run(folder, "--help")
     assert (done.returncode, done.stderr) == (0, "")

@@ -19,9 +19,12 @@ from fmpy.fmi3 import FMU3Model, FMU3Slave
 from fmu_build import build_fmu
 from fmu_build.compile.compiler import FLAGS, TRIAL_FLAGS
 from fmu_build.compile.library import compile_sources
-from fmu_build.generate.model import generate
+from fmu_build.generate.model import generated
 from fmu_build.generate.sources import source_file_names, source_files
+from fmu_build.interface.names import Naming
+from fmu_build.interface.variable_table import variable_table
 from fmu_build.platforms import host_platform
+from supervessel.equations import equations
 from support.scenes import scene
 from support.traps import watch
 
@@ -44,13 +47,15 @@ def store() -> Path:
     return Path(os.environ.get("SUPERVESSEL_TESTS") or tempfile.mkdtemp(prefix="supervessel-test-"))
 
 
-def built(raw: Mapping[str, Any], fmi: int = 3) -> Path:
+def built(raw: Mapping[str, Any], fmi: int = 3, naming: Naming = "structured") -> Path:
     """Returns the path of the FMU of a raw scene, built once in a session."""
-    path = store() / f"{_digest(raw, fmi)}.fmu"
-    return path if path.exists() else build_fmu(scene(raw), path, fmi)
+    path = store() / f"{_digest(raw, fmi, naming)}.fmu"
+    return path if path.exists() else build_fmu(scene(raw), path, fmi, names=naming)
 
 
-def unpacked(raw: Mapping[str, Any], fmi: int = 3, *, optimised: bool = True) -> Path:
+def unpacked(
+    raw: Mapping[str, Any], fmi: int = 3, naming: Naming = "structured", *, optimised: bool = True
+) -> Path:
     """Returns a folder with all of a raw scene's FMU that is loaded, made once in a session.
 
     optimised : whether the library is that of `built`; else it is compiled in a fifth of the time. That of
@@ -58,11 +63,12 @@ def unpacked(raw: Mapping[str, Any], fmi: int = 3, *, optimised: bool = True) ->
     Pictures and pages are left out.
     """
     optimised = optimised and fmi == 3
-    folder = store() / _digest([raw, optimised], fmi)
+    folder = store() / _digest([raw, optimised], fmi, naming)
     if folder.is_dir():
         return folder
     made, parsed = Path(tempfile.mkdtemp(dir=store())), scene(raw)
-    sources, description = generate(parsed, fmi)
+    model = equations(parsed)
+    sources, description = generated(model, variable_table(model, naming), fmi)
     packed, names = source_files(sources, fmi, parsed.name), source_file_names(sources, fmi)
     flags = FLAGS if optimised else TRIAL_FLAGS
     binaries = compile_sources(packed, names, fmi, [host_platform()], parsed.name, flags)
@@ -78,8 +84,8 @@ def unpacked(raw: Mapping[str, Any], fmi: int = 3, *, optimised: bool = True) ->
     return folder
 
 
-def _digest(what: Any, fmi: int) -> str:
-    return hashlib.sha256(json.dumps([what, fmi], sort_keys=True).encode()).hexdigest()
+def _digest(what: Any, fmi: int, naming: Naming) -> str:
+    return hashlib.sha256(json.dumps([what, fmi, naming], sort_keys=True).encode()).hexdigest()
 
 
 @cache
@@ -105,9 +111,10 @@ class Instance:
         exchange: bool = False,
         *,
         optimised: bool = True,
+        naming: Naming = "structured",
         **instantiation: Any,
     ) -> None:
-        folder = unpacked(raw, fmi, optimised=optimised)
+        folder = unpacked(raw, fmi, naming, optimised=optimised)
         self.fmi, self.description = fmi, _description(folder)
         description = self.description
         self.references = {v.name: v.valueReference for v in description.modelVariables}

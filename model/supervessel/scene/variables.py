@@ -192,9 +192,14 @@ def derivative_variables(states: Iterable[Variable]) -> tuple[Variable, ...]:
         Variable(
             f"der({state.name})",
             RATE_UNITS[state.unit],
-            f"rate of {state.name}",
+            f"rate of the state {_words(state)}, element {state.element + 1}",
             group=f"der({state.group})",
             element=state.element,
         )
         for state in states
     )
+
+
+def _words(state: Variable) -> str:
+    """Returns what a state is, in words."""
+    return state.group.removeprefix("state.").replace("_", " ")
