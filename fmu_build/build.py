@@ -10,7 +10,7 @@ from typing import Any
 from fmu_build.accuracy import choose
 from fmu_build.compile.library import compile_sources
 from fmu_build.document.documentation import documentation
-from fmu_build.document.reference_result import reference_result
+from fmu_build.document.reference_result import EVIDENCE, SCENE, manifest, reference_result
 from fmu_build.errors import BuildError
 from fmu_build.generate.model import generated
 from fmu_build.generate.sources import source_file_names, source_files
@@ -23,6 +23,7 @@ from supervessel.composite.resolved import resolve
 from supervessel.equations import Equations, equations
 from supervessel.problems import TradeError
 from supervessel.scene.schema import Scene
+from supervessel.scene.writing import scene_text
 from supervessel.shell.files import OutputError, check_output, write_file
 from supervessel.shell.processes import Workers
 
@@ -60,6 +61,7 @@ def build_fmu(
     check_fmu_output(output)
     check_names(resolve(scene), names)  # before anything is chosen, which takes time
     platforms = platforms or (host_platform(),)
+    given = scene
     scene, evidence = _chosen(scene)
     model = equations(scene)
     entries = variable_table(model, names)
@@ -68,7 +70,7 @@ def build_fmu(
     with Workers(1) as aside:  # the compiler is a process of its own
         compiled = source_file_names(sources, fmi)
         binaries = aside.submit(compile_sources, packed, compiled, fmi, platforms, scene.name)
-        beside = companions(model, entries, fmi, evidence)
+        beside = companions(model, entries, fmi, evidence, given)
     check_fmu_output(output)  # something else may have come there in the meantime
     content = {"modelDescription.xml": description, **packed, **binaries.result(), **beside}
     write_archive(content, output)
@@ -90,19 +92,23 @@ def companions(
     entries: Sequence[TableEntry],
     fmi: int,
     evidence: Mapping[str, Any] | None = None,
+    given: Scene | None = None,
 ) -> dict[str, bytes]:
-    """Returns documentation, icons, terminals and reference result by their paths in the archive.
+    """Returns documentation, icons, terminals, scene and reference result by their paths in the archive.
 
     evidence : of `supervessel.choose`, for a scene with `[accuracy]`
+    given    : the scene as it is given, with `[accuracy]` unanswered; None: that of the model
     """
     scene = model.resolved.scene
-    shown = {} if evidence is None else {"resources/accuracy.json": json.dumps(evidence, indent=1).encode()}
-    return {
+    shown = {} if evidence is None else {EVIDENCE: json.dumps(evidence, indent=1).encode()}
+    files = {
         **documentation(scene, entries, fmi, evidence),
         **shown,
+        SCENE: scene_text(given or scene).encode(),
         "terminalsAndIcons/terminalsAndIcons.xml": terminals_and_icons(scene, entries, fmi),
         **reference_result(model, entries),
     }
+    return files | manifest(files)
 
 
 def check_fmu_output(output: Path, inputs: Iterable[Path] = ()) -> None:

@@ -183,11 +183,18 @@ Tolerance = Annotated[
 Course = Annotated[tuple[tuple[float, float | bool], ...], BeforeValidator(_course)]
 Bounds = Annotated[tuple[float, float], vector("", "two finite numbers [low, high]", size=2)]
 
+# A quotient, a root and the sum under it leave the square of a normalised quaternion within 6 u of 1; what is
+# that close stays as it is, so that a scene that is written out is read as the same.
+UNIT_SLACK = 3.0 * EPSILON
+
 
 def _attitude(value: Any) -> tuple[float, float, float, float]:
     scale = max(abs(component) for component in value)
     if scale == 0.0:
         raise ValueError(f" = {quantity(value)}: must have a length greater than 0")
+    if abs(math.fsum(component * component for component in value) - 1.0) <= UNIT_SLACK:
+        w, x, y, z = value
+        return w, x, y, z
     scaled = [component / scale for component in value]
     norm = math.sqrt(math.fsum(component * component for component in scaled))
     w, x, y, z = (component / norm for component in scaled)
