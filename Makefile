@@ -14,7 +14,7 @@ LOWEST := tests/model tests/orbiter tests/build/test_build.py tests/build/test_s
   tests/twin/test_twin.py tests/twin/test_twin_reference.py tests/twin/test_error_state.py tests/trade/test_trade.py \
   tests/examples/test_lqr_hold.py tests/examples/test_identify.py
 
-.PHONY: run test check lowest constraints platforms robustness stability accuracy surroundings bench slews peers clean
+.PHONY: run test check lowest constraints platforms robustness stability accuracy surroundings bench compatibility slews peers clean
 
 run: .venv/installed
 	$(BIN)/python -m fmu_build examples/iss_dg.toml -o build/iss_dg.fmu
@@ -79,6 +79,12 @@ bench: .venv/installed-dev
 	PYTHONPATH=tests $(BIN)/python tests/bench/instructions.py
 	mkdir -p build
 	$(BIN)/supervessel trade examples/iss_dg.toml --duration 6000 -o build/iss_dg_trade
+
+# What the FMI project asks of tools that export FMUs.
+compatibility: .venv/installed
+	rm -rf build/compatibility
+	$(BIN)/python -m fmu_build.compatibility examples/iss_dg.toml examples/berth.toml examples/launch_stack.toml \
+	  --platform all -o build/compatibility
 
 slews: .venv/installed-dev
 	$(BIN)/python examples/nmpc_slew.py
