@@ -161,7 +161,7 @@ def test_fmpy_flies_co_simulation_as_the_result_says(folder, version):
 def test_fmpy_flies_model_exchange_as_the_result_says_the_more_so_the_shorter_it_holds_inputs(
     folder, version
 ):
-    """FMPy holds inputs over an output interval: what that costs goes with its length, nothing else is left."""
+    """FMPy holds inputs over an output interval: what that costs goes with its length."""
     (place,) = (folder / version / "me").glob("*/pair")
     coarse, fine = off(place, "me", 5), off(place, "me", 50)
     assert fine <= 1e-3

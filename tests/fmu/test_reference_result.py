@@ -220,6 +220,14 @@ def test_numbers_and_texts_are_written_out_whole(raw):
     assert parse_scene(tomllib.loads(scene_text(one))) == one
 
 
+def test_an_attitude_that_was_normalised_is_read_as_it_is():
+    """Else one in three of those drawn here would be another one in its last bit each time it is read."""
+    drawn = np.random.default_rng(20261130).normal(size=(100, 4))
+    for attitude in drawn:
+        once = parse_scene(body(attitude=attitude.tolist())).rotation.attitude
+        assert parse_scene(body(attitude=list(once))).rotation.attitude == once
+
+
 def test_what_accuracy_has_chosen_is_not_written_out():
     asked = {"accuracy": {"attitude": 1e-6, "horizon": 10.0, "step": 0.1}}
     one = parse_scene(variant(body(), {"inputs": {}}) | asked)
