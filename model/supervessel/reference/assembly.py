@@ -312,7 +312,7 @@ def joined(parts: Iterable[Points]) -> Points:
 def composite(scene: Scene, values: Mapping[str, float] | None = None) -> Composite:
     """Returns the mass distribution of what is joined to the root, summed over six points a vessel.
 
-    values : inputs by the FMU's names that differ from the scene's, `{"DG.mass": 12000.0}`
+    values : inputs by the FMU's structured names that differ from the scene's, `{"DG.mass": 12000.0}`
     Source: [CV] eqs. (10), (11), with the products of inertia that the note leaves out; by the convention
     "orbiter" without.
 

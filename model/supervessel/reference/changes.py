@@ -18,7 +18,7 @@ def change(
     """Returns the angular velocity, (3,) [rad/s], body axes, after inputs have changed at one instant.
 
     angular_velocity : (3,) [rad/s], body axes, until then
-    before, after    : inputs by the FMU's names; what is missing has the scene's value
+    before, after    : inputs by the FMU's structured names; what is missing has the scene's value
     In this order: vessels leave, with the motion they have; masses and moments change; poses and the motion
     of ports change; vessels arrive. The law "none" keeps the angular velocity.
     Raises ValueError if docks close that cannot, see `closed_docks`.

@@ -76,8 +76,8 @@ class Twin(Plant):
     numbers; `error_bound` and `error_bound_change` bound what law and method are off by; `error`, `retract`,
     `error_ode`, `linearise`, `discretise`, `trim`, `principal`, `invariants` are for control design. All have
     named arguments, are made when first used, and check numbers that they are
-    called with (`TwinFunction`). p, u, x, h are symbols; p_names, u_names, x_names, y_names the FMU's names;
-    p_start and x_start the scene's values.
+    called with (`TwinFunction`). p, u, x, h are symbols; p_names, u_names, x_names, y_names the FMU's names,
+    structured ones always; p_start and x_start the scene's values.
 
     Each number of composite, ode, outputs but principal ones, and of a single sub-step of "rk4", "dop853" and
     "taylor" is the FMU's to the last bit: both evaluate the same operations in the same order, and only
