@@ -6,7 +6,7 @@ dock with an input switches after a third of the time, and back after two thirds
 tenth of the body's; everything else stays.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil, inf, sqrt
@@ -55,6 +55,10 @@ class Stimuli:
     def times(self) -> Array:
         """The communication points [s], (STEPS + 1,)."""
         return self.step * np.arange(STEPS + 1, dtype=np.float64)
+
+    def within(self, begin: float, end: float) -> Callable[[float], Array]:
+        """Returns the function time [s] -> inputs over a span of time [s], at its end those before a jump."""
+        return lambda time: self.at(time, before=time >= end)
 
     def at(self, time: float, *, before: bool = False) -> Array:
         """Returns the inputs at a time [s], at a jump those after it.
@@ -111,7 +115,7 @@ def exchange_flight(model: Equations, stimuli: Stimuli) -> tuple[Array, Array]:
     x = np.array([*scene.rotation.attitude, *scene.rotation.angular_velocity])
     times, rows = [0.0], [_outputs(model, x, stimuli.at(0.0))]
     for begin, end in pairwise(stimuli.times):
-        x = _integrated(model, stimuli, x, (begin, end))
+        x = _integrated(model, stimuli.within(begin, end), x, (begin, end))
         old, new = stimuli.at(end, before=True), stimuli.at(end)
         times.append(end)
         rows.append(_outputs(model, x, old))
@@ -122,16 +126,21 @@ def exchange_flight(model: Equations, stimuli: Stimuli) -> tuple[Array, Array]:
     return np.array(times), np.vstack(rows)
 
 
-def _integrated(model: Equations, stimuli: Stimuli, x: Array, span: tuple[float, float]) -> Array:
-    """Returns the state x at the end of a span of time [s] without a jump within it."""
+def _integrated(
+    model: Equations, inputs_at: Callable[[float], Array], x: Array, span: tuple[float, float]
+) -> Array:
+    """Returns the state x at the end of a span of time [s], by RK4.
+
+    inputs_at : time [s] -> inputs
+    """
     begin, end = span
-    held = stimuli.at(begin)
-    square = float(model.steps.fastest_square(x, _action(model, held), _composite(model, held)))
+    first = inputs_at(begin)
+    square = float(model.steps.fastest_square(x, _action(model, first), _composite(model, first)))
     count = max(FEWEST_EXCHANGE_STEPS, ceil((end - begin) * sqrt(square) / EXCHANGE_ANGLE))
     h = (end - begin) / count
 
     def rate(x: Array, time: float) -> Array:
-        inputs = stimuli.at(time, before=time >= end)
+        inputs = inputs_at(time)
         return np.array(model.ode(x, _action(model, inputs), _composite(model, inputs))).ravel()
 
     for i in range(count):
@@ -188,7 +197,7 @@ def _last_inputs(model: Equations, inputs: Sequence[InputVariable], first: Array
         value = float(start)
         if variable.kind is MASS and scene.keeps["mass"] == "rate":
             value = max(0.9 * value, variable.low or 0.0)
-        elif variable.kind is TORQUE:
+        elif variable.kind is TORQUE and model.plan.method is not None:  # else free motion alone is possible
             value = _within(variable, smallest * rate / duration)
         elif variable.kind is CONTACT_RATE:
             value = _within(variable, CONTACT * rate)
@@ -275,7 +284,9 @@ def _action(model: Equations, inputs: Array) -> Array:
 
 
 def _fly(model: Equations, stimuli: Stimuli, change: ca.Function | None) -> Array | None:
-    """Returns the outputs at each communication point, (STEPS + 1, ny), as the FMU computes them.
+    """Returns the outputs at each communication point, (STEPS + 1, ny), by the scene's own method.
+
+    Of "split", which is more than a step of it, by RK4 in steps of EXCHANGE_ANGLE.
 
     change : what a change of inputs does to the rate, None where none of these changes does anything
     None if that takes more than MOST_SUB_STEPS.
@@ -288,19 +299,31 @@ def _fly(model: Equations, stimuli: Stimuli, change: ca.Function | None) -> Arra
         inputs = stimuli.at(time)
         x = _changed(model, change, x, (held, inputs))
         held = inputs
-        c, u = _composite(model, held), _action(model, held)
-        remaining = stimuli.step
-        while remaining > 0.0:
-            square = float(model.steps.fastest_square(x, u, c))
-            count = remaining * sqrt(square) / scene.rotation.max_angle_step if square >= 0.0 else np.inf
-            taken += 1
-            if not taken + count <= MOST_SUB_STEPS:
-                return None
-            size = remaining / max(1, ceil(count))
-            x = np.array(model.steps.step.call([x, u, c, size])[0]).ravel()
-            remaining = remaining - size if count > 1.0 else 0.0
+        end = _stepped(model, x, held, stimuli.step, MOST_SUB_STEPS - taken)
+        if end is None:
+            return None
+        x, sub_steps = end
+        taken += sub_steps
         rows.append(_outputs(model, x, held))  # of the step's end: its inputs still hold
     return np.vstack(rows)
+
+
+def _stepped(model: Equations, x: Array, held: Array, step: float, most: int) -> tuple[Array, int] | None:
+    """Returns the state x after a communication step [s], and in how many sub-steps; None beyond `most`."""
+    c, u, angle = _composite(model, held), _action(model, held), model.resolved.scene.rotation.max_angle_step
+    remaining, taken = step, 0
+    while remaining > 0.0:
+        square = float(model.steps.fastest_square(x, u, c))
+        count = remaining * sqrt(square) / angle if square >= 0.0 else np.inf
+        taken += 1
+        if not taken + count <= most:
+            return None
+        if model.plan.free == "between kicks":
+            return _integrated(model, lambda _: held, x, (0.0, step)), taken
+        size = remaining / max(1, ceil(count))
+        x = np.array(model.steps.step.call([x, u, c, size])[0]).ravel()
+        remaining = remaining - size if count > 1.0 else 0.0
+    return x, taken
 
 
 def _outputs(model: Equations, x: Array, inputs: Array) -> Array:

@@ -53,7 +53,7 @@ def test_the_archive_holds_one_library_and_what_the_standard_has_beside_it(fmi):
     assert names[0] == f"binaries/{folder}/iss_dg{host_platform().suffix}"
     folders = {name.partition("/")[0] for name in names[1:]}
     icon = {"model.png"} if fmi == 2 else set()
-    beside = {"documentation", "extra", "modelDescription.xml", "sources", "terminalsAndIcons"}
+    beside = {"documentation", "extra", "modelDescription.xml", "resources", "sources", "terminalsAndIcons"}
     assert folders == beside | icon
 
 

@@ -55,11 +55,15 @@ SCENES: dict[str, dict[str, Any]] = {
     ),
     "principal": variant(BERTH, {"name": "principal", "rotation.law": "principal"}),
     "dock, law none": variant(BERTH, {"name": "held", "rotation.law": "none"}),
+    "split": {**body(propagator="split", tolerance=1e-11, **TURNING), "name": "split"},
+    "exact": {**body(propagator="exact", **TURNING), "name": "exact"},
+    "auto": {**body(propagator="auto", **TURNING), "name": "auto"},
     "error told": variant(body(**TURNING), {"name": "told", "outputs.names": ["error_estimate", "attitude"]}),
 }
 
-# RK4's steps are the same but for rounding; dop853 keeps 1e-9 a step, attitude in rad and rate relative.
-TOLERANCE = {"moving port": 1e-7}
+# RK4's steps are the same but for rounding; dop853 keeps 1e-9 a step, attitude in rad and rate relative; the
+# result of split is RK4's, in steps of 0.01 rad, the others' are of higher order than any of these.
+TOLERANCE = {"moving port": 1e-7, "split": 1e-8, "exact": 1e-10, "auto": 1e-10}
 ROUNDING = 1e-12
 
 
