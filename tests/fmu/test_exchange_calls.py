@@ -48,7 +48,7 @@ CALLS: dict[str, tuple[str, str, Callable[[Instance], int]]] = {
     "get a state": ("EOOOOO", "OOOOOO", lambda i: i.get_status("state.attitude[1]")),
     "set an input": ("OOOOEE", "OOOOEE", lambda i: i.set({"DG.mass": 2e4})),
     "set a parameter": ("OOEEEE", "OOEEEE", lambda i: i.set({"attitude_start[2]": 0.1})),
-    "set a state": ("EEOOEE", "EEOOEE", lambda i: i.set({"state.attitude[2]": 0.1})),
+    "set a state": ("OEOOEE", "OEOOEE", lambda i: i.set({"state.attitude[2]": 0.1})),
     "set a rate": ("EEEEEE", "EEEEEE", lambda i: i.set({"der(state.attitude[2])": 0.1})),
     "ExitInitializationMode": ("EOEEEE", "EOEEEE", raw_call("ExitInitializationMode")),
     "Terminate": ("EEOOEE", "EEOOEE", raw_call("Terminate")),
