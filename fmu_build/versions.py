@@ -38,8 +38,9 @@ VERSIONS: dict[int, Version] = {
         icon="model.png",
         terminals="3.0",
         platform_tuples=False,
-        refusal="The answer is Discard where FMI 2.0 allows it (a set, a step; in model exchange a get and "
-        "the derivatives too), else Error.",
+        refusal="The answer is Discard where FMI 2.0 allows it and it helps (a set, a step that is too long; "
+        "in model exchange a get and the derivatives too), else Error; either way a good value can be set, "
+        "and the same call works.",
     ),
     3: Version(
         "3.0",

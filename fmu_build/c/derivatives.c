@@ -11,10 +11,11 @@
 #include "model.h"
 #include "variables.h"
 
-/* What a reference may stand for in a set of knowns or unknowns, as bits of (1 << role). */
+/* What a reference may stand for in a set of knowns or unknowns, as bits of (1 << role). Once initialisation has ended
+   nothing depends on the start parameters any more, since the states are given: derivatives by them are 0. */
 static unsigned allowed_knowns(const Instance *instance) {
-    const unsigned at_start = 1u << ROLE_PARAMETER, later = 1u << ROLE_STATE;
-    return (1u << ROLE_TIME) | (1u << ROLE_INPUT) | (instance->now.state & BEFORE_START ? at_start : later);
+    const unsigned always = (1u << ROLE_TIME) | (1u << ROLE_INPUT) | (1u << ROLE_PARAMETER);
+    return always | (instance->now.state & BEFORE_START ? 0u : 1u << ROLE_STATE);
 }
 
 static unsigned allowed_unknowns(const Instance *instance) {
@@ -95,6 +96,12 @@ static double *place(Variation *v, unsigned reference) {
     }
 }
 
+/* The same for a known, by which alone start parameters come here. */
+static double *place_of_known(const Instance *instance, Variation *v, unsigned reference) {
+    const bool counts = VARIABLES[reference].role != ROLE_PARAMETER || (instance->now.state & BEFORE_START);
+    return counts ? place(v, reference) : NULL;
+}
+
 /* From changes of x, u, c to changes of rate and y. ordinary: as of instance_call. */
 static void respond(Instance *instance, bool ordinary) {
     Variation *v = &instance->scratch.variation;
@@ -123,7 +130,7 @@ static Status forward(Instance *instance, const unsigned unknowns[], size_t unkn
     memset(v, 0, sizeof *v);
     bool shape_changes = false;
     for (size_t i = 0; i < known_count; i++) {
-        double *change = place(v, knowns[i]);
+        double *change = place_of_known(instance, v, knowns[i]);
         if (change) *change += seed[i];
         shape_changes = shape_changes || (knowns[i] < REFERENCE_CONTACT && seed[i] != 0.0);
     }
@@ -184,7 +191,7 @@ static Status adjoint(Instance *instance, const unsigned unknowns[], size_t unkn
     if (status != STATUS_OK) return status;
     composite_scale_variation(instance, v->inputs);
     for (size_t i = 0; i < known_count; i++) {
-        const double *weight = place(v, knowns[i]);
+        const double *weight = place_of_known(instance, v, knowns[i]);
         sensitivity[i] = weight ? *weight : 0.0;
     }
     return status;

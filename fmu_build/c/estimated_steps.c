@@ -5,12 +5,12 @@
 
 Status estimated_refuse_count(Instance *instance, const Progress *progress, double count) {
     const double *x = instance_x(instance);
-    return instance_refuse(instance,
-                           "communicationStepSize = %.10g s needs %.6g sub-steps for tolerance = %.3g with "
-                           "angular_velocity = (%.10g, %.10g, %.10g) rad/s, %.10g s before its end; at most %g are "
-                           "taken",
-                           progress->h, count, instance->now.tolerance, x[4], x[5], x[6], progress->remaining,
-                           MOST_SUB_STEPS);
+    return instance_refuse_size(instance,
+                                "communicationStepSize = %.10g s needs %.6g sub-steps for tolerance = %.3g with "
+                                "angular_velocity = (%.10g, %.10g, %.10g) rad/s, %.10g s before its end; at most %g are "
+                                "taken",
+                                progress->h, count, instance->now.tolerance, x[4], x[5], x[6], progress->remaining,
+                                MOST_SUB_STEPS);
 }
 
 /* Below an angle that any tolerance allows nothing needs to be asked. */

@@ -86,10 +86,10 @@ static Status free_piece(Instance *instance, double x[], double *time, bool whol
         finite = all_finite(next, STATE_COUNT);
     }
     if (!finite)
-        return instance_refuse(instance,
-                               "free motion over %.10g s from angular_velocity = (%.10g, %.10g, %.10g) rad/s leaves "
-                               "the range of finite numbers",
-                               *time, x[4], x[5], x[6]);
+        return instance_refuse_size(instance,
+                                    "free motion over %.10g s from angular_velocity = (%.10g, %.10g, %.10g) rad/s "
+                                    "leaves the range of finite numbers",
+                                    *time, x[4], x[5], x[6]);
     memcpy(x, next, sizeof next);
     *time -= taken;
     return STATUS_OK;
@@ -102,11 +102,11 @@ bool free_reaches(const double x[], double time) {
 
 Status free_motion(Instance *instance, const double x[], double time, double next[]) {
     if (!free_reaches(x, time))
-        return instance_refuse(instance,
-                               "free motion over %.10g s with angular_velocity = (%.10g, %.10g, %.10g) rad/s turns the "
-                               "body by %.3g rad; it is followed for %g rad in a step",
-                               time, x[4], x[5], x[6], hypot(hypot(x[4] * time, x[5] * time), x[6] * time),
-                               LARGEST_TURN);
+        return instance_refuse_size(instance,
+                                    "free motion over %.10g s with angular_velocity = (%.10g, %.10g, %.10g) rad/s turns "
+                                    "the body by %.3g rad; it is followed for %g rad in a step",
+                                    time, x[4], x[5], x[6], hypot(hypot(x[4] * time, x[5] * time), x[6] * time),
+                                    LARGEST_TURN);
     composite_refresh_axes(instance);
     memcpy(next, x, STATE_COUNT * sizeof(double));
     if (is_at_rest(x)) return STATUS_OK;

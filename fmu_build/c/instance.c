@@ -25,6 +25,7 @@ static const struct {
     {LOG_NAME_DISCARD, LOG_DISCARD},
     {LOG_NAME_ERROR, LOG_ERROR},
     {LOG_NAME_COMPOSITE, LOG_COMPOSITE},
+    {LOG_NAME_TOLERANCE, LOG_TOLERANCE},
 #if ACCURACY_ASKED
     {LOG_NAME_ACCURACY, LOG_ACCURACY},
 #endif
@@ -136,14 +137,21 @@ Status instance_refuse(Instance *instance, const char *format, ...) {
     va_start(arguments, format);
     write_message(instance, status, status == STATUS_ERROR ? LOG_ERROR : LOG_DISCARD, format, arguments);
     va_end(arguments);
-    if (status == STATUS_ERROR) instance_terminate(instance);
     return status;
+}
+
+Status instance_refuse_size(Instance *instance, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    write_message(instance, STATUS_DISCARD, LOG_DISCARD, format, arguments);
+    va_end(arguments);
+    return STATUS_DISCARD;
 }
 
 void instance_inform(Instance *instance, LogCategory category, const char *format, ...) {
     va_list arguments;
     va_start(arguments, format);
-    write_message(instance, category == LOG_ACCURACY ? STATUS_WARNING : STATUS_OK, category, format, arguments);
+    write_message(instance, STATUS_OK, category, format, arguments);
     va_end(arguments);
 }
 
@@ -174,7 +182,7 @@ bool instance_admits(Instance *instance, const Call *call) {
 
 Status instance_set_logging(Instance *instance, bool on, size_t count, const char *const names[]) {
     if (count > 0 && !names) return instance_error(instance, "categories is NULL");
-    unsigned categories = on && count == 0 ? LOG_ALL : 0;
+    unsigned categories = count == 0 ? LOG_ALL : 0;
     for (size_t i = 0; i < count; i++) {
         size_t k = 0;
         while (k < LOG_CATEGORY_COUNT && !(names[i] && strcmp(names[i], LOG_CATEGORIES[k].name) == 0)) k++;
@@ -182,8 +190,21 @@ Status instance_set_logging(Instance *instance, bool on, size_t count, const cha
             return instance_error(instance, "category %zu is not one of the model description's", i + 1);
         categories |= LOG_CATEGORIES[k].categories;
     }
-    instance->log_categories = on ? categories : 0;
+    if (on)
+        instance->log_categories |= categories;
+    else
+        instance->log_categories &= ~categories;
     return STATUS_OK;
+}
+
+/* The tolerance nearest to the importer's that steps can keep to; an importer's own is often 0, or made for another
+   FMU, and the standard lets an FMU for co-simulation ignore it (FMI 2.0: 2.1.6, FMI 3.0: 2.3.2). */
+static double possible_tolerance(Instance *instance, double tolerance) {
+    const double possible = fmin(fmax(tolerance, LEAST_TOLERANCE), LARGEST_TOLERANCE);
+    if (possible != tolerance)
+        instance_inform(instance, LOG_TOLERANCE, "tolerance = %.10g: %g is taken, since steps keep to %g to %g",
+                        tolerance, possible, LEAST_TOLERANCE, LARGEST_TOLERANCE);
+    return possible;
 }
 
 Status instance_set_experiment(Instance *instance, bool tolerance_defined, double tolerance, double start_time,
@@ -193,10 +214,9 @@ Status instance_set_experiment(Instance *instance, bool tolerance_defined, doubl
         return instance_error(instance, "stopTime = %.10g s: must not be before startTime = %.10g s", stop_time,
                               start_time);
     tolerance_defined = tolerance_defined && ERROR_CONTROLLED && !instance->now.model_exchange;
-    if (tolerance_defined && !(tolerance >= LEAST_TOLERANCE && tolerance <= LARGEST_TOLERANCE))
-        return instance_error(instance, "tolerance = %.10g: must be from %g to %g", tolerance, LEAST_TOLERANCE,
-                              LARGEST_TOLERANCE);
-    instance->now.tolerance = tolerance_defined ? tolerance : TOLERANCE;
+    if (tolerance_defined && !(isfinite(tolerance) && tolerance >= 0.0))
+        return instance_error(instance, "tolerance = %.10g: must be finite and >= 0", tolerance);
+    instance->now.tolerance = tolerance_defined ? possible_tolerance(instance, tolerance) : TOLERANCE;
     instance->now.values[REFERENCE_TIME] = start_time;
     instance->now.start_time = start_time;
     instance->now.stop_time = stop_time;

@@ -2,7 +2,8 @@
 
    An instance is one block of memory, owned by the importer between instance_new and instance_free; nothing else is
    allocated but saved states. Functions return STATUS_OK, or log one line and return what the FMI function shall
-   return: after STATUS_DISCARD the instance is as it was before the call, after STATUS_ERROR it is TERMINATED.
+   return. After a value that cannot be used (instance_refuse), or a step that is too long, the instance is as it was
+   before the call; after a broken rule (instance_error) it is TERMINATED.
 
    A mass on its way from the importer's set to a get, copy by copy; beside each arrow stands the file that owns the
    copy which the arrow points to: it alone writes there.
@@ -66,7 +67,14 @@ typedef enum {
 } State;
 
 /* Log categories, as bits. */
-typedef enum { LOG_DISCARD = 1, LOG_ERROR = 2, LOG_COMPOSITE = 4, LOG_ACCURACY = 8, LOG_ALL = 15 } LogCategory;
+typedef enum {
+    LOG_DISCARD = 1,
+    LOG_ERROR = 2,
+    LOG_COMPOSITE = 4,
+    LOG_TOLERANCE = 8,
+    LOG_ACCURACY = 16,
+    LOG_ALL = 31
+} LogCategory;
 
 /* An FMI function: the states it may be called in, and what it answers to values that cannot be used. */
 typedef struct {
@@ -190,13 +198,18 @@ bool instance_admits(Instance *instance, const Call *call);
 /* Logs that the importer broke a rule, terminates the instance and returns STATUS_ERROR. */
 Status instance_error(Instance *instance, const char *format, ...) PRINTF_LIKE(2, 3);
 
-/* Logs that a value cannot be used and returns the call's refusal; terminates the instance if that is an error. */
+/* Logs that a value cannot be used and returns the call's refusal; the instance is as it was before the call, whatever
+   the status is: with a good value the same call works. */
 Status instance_refuse(Instance *instance, const char *format, ...) PRINTF_LIKE(2, 3);
+
+/* Logs that a step is too long and returns STATUS_DISCARD, in either version of FMI: a shorter one may do. */
+Status instance_refuse_size(Instance *instance, const char *format, ...) PRINTF_LIKE(2, 3);
 
 /* Logs for information, if the category is on. */
 void instance_inform(Instance *instance, LogCategory category, const char *format, ...) PRINTF_LIKE(3, 4);
 
-/* Turns categories on by name (count 0: all of them) or, with on == false, everything off. */
+/* Turns the named categories on, or with on == false off, and leaves the others as they are; count 0: all of them. An
+   unknown name is an error, and nothing is changed. */
 Status instance_set_logging(Instance *instance, bool on, size_t count, const char *const names[]);
 
 /* Where the FMU's states (attitude w, x, y, z; angular velocity, rad/s, or momentum, N.m.s) and their rates stand among

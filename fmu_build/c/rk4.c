@@ -22,21 +22,21 @@ Status solver_sub_step(Instance *instance, Progress *progress) {
         size = progress->remaining / count;
     }
     if (!(progress->taken + count <= MOST_SUB_STEPS))
-        return instance_refuse(instance,
-                               "communicationStepSize = %.10g s needs %.6g sub-steps of max_angle_step = %.10g rad "
-                               "with angular_velocity = (%.10g, %.10g, %.10g) rad/s, %.10g s before its end; at most "
-                               "%g are taken",
-                               progress->h, progress->taken + count, MAX_ANGLE_STEP, x[4], x[5], x[6],
-                               progress->remaining, MOST_SUB_STEPS);
+        return instance_refuse_size(instance,
+                                    "communicationStepSize = %.10g s needs %.6g sub-steps of max_angle_step = %.10g rad "
+                                    "with angular_velocity = (%.10g, %.10g, %.10g) rad/s, %.10g s before its end; at most "
+                                    "%g are taken",
+                                    progress->h, progress->taken + count, MAX_ANGLE_STEP, x[4], x[5], x[6],
+                                    progress->remaining, MOST_SUB_STEPS);
     instance->arg[3] = &size;
     instance->res[0] = next;
     instance->res[1] = error;
     step(instance->arg, instance->res, instance->iw, instance->w, 0);
     if (!is_finite(next))
-        return instance_refuse(instance,
-                               "a sub-step of %.10g s from angular_velocity = (%.10g, %.10g, %.10g) rad/s leaves the "
-                               "range of finite numbers",
-                               size, x[4], x[5], x[6]);
+        return instance_refuse_size(instance,
+                                    "a sub-step of %.10g s from angular_velocity = (%.10g, %.10g, %.10g) rad/s leaves the "
+                                    "range of finite numbers",
+                                    size, x[4], x[5], x[6]);
     progress->taken += 1.0;
     progress->error += error[0] + error[1] * progress->remaining + HALF_ULP;
     memcpy(x, next, sizeof next);

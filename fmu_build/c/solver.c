@@ -12,6 +12,9 @@
 #include "model.h"
 #include "variables.h"
 
+/* Of the span from startTime to stopTime. */
+static const double PAST_STOP = 1e-9;
+
 /* Rounding that an importer's own times may show, which are sums of its step sizes or multiples of one, counted from
    the start: half an ulp each of a product, a sum and the step added here, none of terms larger than these. */
 static double time_slack(const Dynamics *now, double h) {
@@ -19,18 +22,24 @@ static double time_slack(const Dynamics *now, double h) {
     return 4.0 * DBL_EPSILON * larger(largest, h);
 }
 
+/* By how much the last step of a flight may pass stopTime [s]: a sum of step sizes is off by a rounding at each of them,
+   after a million steps by up to 1e-10 of the span. */
+static double stop_slack(const Dynamics *now, double h) {
+    const double rounding = larger(time_slack(now, h), 4.0 * DBL_EPSILON * fabs(now->stop_time));
+    return larger(rounding, PAST_STOP * now->stop_time - PAST_STOP * now->start_time);
+}
+
 static Status check_times(Instance *instance, double time, double h) {
     const Dynamics *now = &instance->now;
     /* isfinite(h) beside h > 0.0 would cost twenty instructions more: clang joins them to one test of h's bits */
     if (!(isgreater(h, 0.0) && islessequal(h, DBL_MAX)))
         return instance_error(instance, "communicationStepSize = %.10g s: must be finite and > 0", h);
-    const double slack = time_slack(now, h);
     if (!(fabs(time - now->values[REFERENCE_TIME]) <= time_slack(now, 0.0)))
         return instance_error(instance, "currentCommunicationPoint = %.17g s: must be the instance's time %.17g s",
                               time, now->values[REFERENCE_TIME]);
     if (!isfinite(time + h))
         return instance_error(instance, "the step from %.17g s by %.10g s ends beyond all finite times", time, h);
-    if (now->stop_time_defined && (time + h) - now->stop_time > larger(slack, 4.0 * DBL_EPSILON * fabs(now->stop_time)))
+    if (now->stop_time_defined && (time + h) - now->stop_time > stop_slack(now, h))
         return instance_error(instance, "the step from %.17g s by %.10g s passes stopTime = %.17g s", time, h,
                               now->stop_time);
     return STATUS_OK;

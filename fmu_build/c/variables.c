@@ -130,6 +130,7 @@ static Status check_settable(Instance *instance, const Variable *variable) {
         case ROLE_OUTPUT: return instance_error(instance, "%s is an output and cannot be set", variable->name);
         case ROLE_STATE: /* beside SetContinuousStates: CasADi's importer sets states by reference */
             if (instance->now.model_exchange && (instance->now.state & (EVENT | CONTINUOUS))) return STATUS_OK;
+            if (instance->now.state == INSTANTIATED) return STATUS_OK; /* a guess, see instance_set */
             return instance_error(instance, "%s is a state: it can be set in model exchange once it runs",
                                   variable->name);
         case ROLE_DERIVATIVE:
@@ -167,6 +168,12 @@ static bool hold_states(const unsigned references[], size_t count) {
     return held;
 }
 
+/* Before initialisation a state may be guessed (initial = "approx"); nothing is searched for that begins from a guess:
+   what a flight starts from are the start parameters. */
+static bool is_guess(const Instance *instance, unsigned reference) {
+    return instance->now.state == INSTANTIATED && VARIABLES[reference].role == ROLE_STATE;
+}
+
 /* States that are set in event mode go with the inputs set before them: those are judged, and make their change. */
 static Status before_states(Instance *instance) {
     return CHANGES && instance->now.state == EVENT ? composite_refresh(instance) : STATUS_OK;
@@ -192,7 +199,7 @@ Status instance_set(Instance *instance, const unsigned references[], size_t coun
     bool changed = false, shape_changed = false;
     for (size_t i = 0; i < count; i++) {
         double *value = &instance->now.values[references[i]];
-        if (*value == values[i]) continue;
+        if (*value == values[i] || is_guess(instance, references[i])) continue;
         *value = values[i];
         changed = true;
         shape_changed = shape_changed || references[i] < REFERENCE_TORQUE;

@@ -6,7 +6,8 @@ from fmu_build.compile.compiler import FLAGS, compile_binaries
 from fmu_build.platforms import Platform
 
 WHOLE = "whole.c"
-"""All of an FMU's C in one translation unit, so that the compiler inlines across files."""
+"""All of an FMU's C in one translation unit, so that the compiler inlines across files; FMI's functions keep
+their plain names, by which importers look them up in a shared library."""
 
 
 def compile_sources(  # noqa: PLR0913, PLR0917
@@ -25,6 +26,7 @@ def compile_sources(  # noqa: PLR0913, PLR0917
     flags      : of the compiler
     Raises BuildError if the compiler fails, or if what it reads and makes cannot be written.
     """
-    whole = "".join(f'#include "sources/{name}"\n' for name in names)
+    plain_names = f"#define FMI{fmi}_OVERRIDE_FUNCTION_PREFIX\n"
+    whole = plain_names + "".join(f'#include "sources/{name}"\n' for name in names)
     files = {**packed, WHOLE: whole.encode()}
     return compile_binaries(files, WHOLE, platforms, fmi, identifier, flags)

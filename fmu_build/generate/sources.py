@@ -1,8 +1,9 @@
 """The C that an FMU is compiled from, as it lies in the archive: any C99 compiler can build the FMU again.
 
-No file defines FMI2_FUNCTION_PREFIX or FMI3_FUNCTION_PREFIX: a shared library exports the plain names, and an
-importer that links the sources into a program gives the prefix to its compiler. The FMI standard's headers
-are the importer's own.
+FMI's functions have the model's name before their own, as the standard asks for sources (FMI 2.0: 2.1.1, FMI
+3.0: 2.2.1), so that several FMUs can be linked into one program. Who compiles a shared library, which exports
+the plain names, defines FMI2_OVERRIDE_FUNCTION_PREFIX or FMI3_OVERRIDE_FUNCTION_PREFIX (FMI 2.0.4: 2.1.1).
+The FMI standard's headers are the importer's own.
 """
 
 import hashlib
@@ -45,7 +46,15 @@ PRELUDE = """\
 #define DIVIDES_ONLY_AS_WRITTEN
 #endif
 
-/* Several FMUs can be linked into one program, and no name is taken for one of the system's. */
+/* Several FMUs can be linked into one program, and no name is taken for one of the system's. A shared library
+   exports FMI's plain names: who compiles one defines the first of these, or another prefix. */
+"""
+
+FUNCTION_PREFIX = """\
+#if !defined({version}_OVERRIDE_FUNCTION_PREFIX) && !defined({version}_FUNCTION_PREFIX)
+#define {version}_FUNCTION_PREFIX {identifier}_
+#endif
+
 """
 
 CASADI_NAME = re.compile(r"^#define (casadi_\w+) CASADI_PREFIX\((\w+)\)$", re.MULTILINE)
@@ -95,7 +104,7 @@ def source_files(scene_sources: Mapping[str, str], fmi: int, model_identifier: s
     external = _external_names(texts[name] for name in names)
     for name in names:
         texts[name] = '#include "prelude.h"\n' + texts[name]
-    texts["prelude.h"] = _prelude(external, model_identifier)
+    texts["prelude.h"] = _prelude(external, model_identifier, fmi)
     if not VERSIONS[fmi].lists_sources:
         texts["buildDescription.xml"] = _build_description(model_identifier, names)
     return {f"sources/{name}": texts[name].encode() for name in sorted(texts)}
@@ -111,10 +120,11 @@ def _external_names(texts: Iterable[str]) -> set[str]:
     return {name for name in names if not name.startswith("fmi")}
 
 
-def _prelude(names: Iterable[str], model_identifier: str) -> str:
-    """Returns prelude.h, with the model's name for each external name."""
-    lines = "\n".join(f"#define {name} {model_identifier}_{name}" for name in sorted(names))
-    return PRELUDE + lines + "\n\n#endif\n"
+def _prelude(names: Iterable[str], model_identifier: str, fmi: int) -> str:
+    """Returns prelude.h: the prefix of FMI's functions, and another name for each external name."""
+    prefix = FUNCTION_PREFIX.format(version=f"FMI{fmi}", identifier=model_identifier)
+    lines = "\n".join(f"#define {name} {model_identifier}_fmi{fmi}_{name}" for name in sorted(names))
+    return PRELUDE + prefix + lines + "\n\n#endif\n"
 
 
 def _build_description(model_identifier: str, names: Iterable[str]) -> str:

@@ -15,8 +15,10 @@ LOG_ACCURACY = "logAccuracy"
 
 LOG_CATEGORIES = {
     "logStatusDiscard": "a value or a step was refused; the instance is as it was before the call",
-    "logStatusError": "a rule of the standard was broken; the instance is terminated",
+    "logStatusError": "a rule of the standard was broken, and the instance is terminated; or a value was "
+    "refused where FMI 2.0 has no Discard",
     "logComposite": "the composite was computed because one of its inputs changed",
+    "logTolerance": "the importer's tolerance is none that steps can keep to, and the nearest is taken",
     LOG_ACCURACY: "the bound of the error has passed what the scene asks for; told once",
     "logAll": "all of these",
 }
@@ -27,7 +29,7 @@ ROLES: dict[Role, dict[str, str]] = {
     "input": {"causality": "input", "variability": "continuous"},
     "parameter": {"causality": "parameter", "variability": "fixed", "initial": "exact"},
     "output": {"causality": "output", "variability": "continuous", "initial": "calculated"},
-    "state": {"causality": "local", "variability": "continuous", "initial": "calculated"},
+    "state": {"causality": "local", "variability": "continuous", "initial": "approx"},
     "derivative": {"causality": "local", "variability": "continuous", "initial": "calculated"},
 }
 

@@ -4,7 +4,7 @@ The modelDescription.xml and the C layer are both written from it.
 """
 
 from collections.abc import Iterable, Mapping, Sequence, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
@@ -14,6 +14,7 @@ from fmu_build.generate.vessel_loop import LONGEST_CODE
 from fmu_build.interface import names as fmu_names
 from fmu_build.interface.names import Naming, check_names, flat
 from fmu_build.interface.nominals import magnitudes_at_start, nominal_of
+from supervessel.composite.start import p_start
 from supervessel.equations import Equations
 from supervessel.scene.schema import keeps_momentum
 from supervessel.scene.variables import Variable
@@ -80,7 +81,7 @@ def variable_table(model: Equations, naming: Naming = "structured") -> tuple[Tab
         "input": resolved.inputs,
         "parameter": resolved.parameters,
         "output": resolved.outputs,
-        "state": resolved.states,
+        "state": _with_starts(model),
         "derivative": resolved.derivatives,
     }
     first = _first_references(groups)
@@ -99,6 +100,20 @@ def variable_table(model: Equations, naming: Naming = "structured") -> tuple[Tab
             nominal = nominal_of(variable, whole)
             entries.append(TableEntry(variable, first[role] + i, role, nominal, now, initial, naming))
     return tuple(entries)
+
+
+def _with_starts(model: Equations) -> list[Variable]:
+    """Returns the states with the values that the scene's own start makes of them.
+
+    The FMU computes them at initialisation. Importers that set up a problem of their own, as CasADi's does,
+    begin from them: without them from a quaternion of zeros.
+    """
+    rotation, kept = model.resolved.scene.rotation, ca.DM(model.resolved.scene.rotation.angular_velocity)
+    if keeps_momentum(model.resolved.scene):
+        assert model.change is not None
+        kept = model.change.momentum_of(kept, model.composite(p_start(model.resolved.scene)))
+    starts = (*rotation.attitude, *kept.elements())
+    return [replace(state, start=value) for state, value in zip(model.resolved.states, starts, strict=True)]
 
 
 def _first_references(groups: Mapping[Role, Sequence[Variable]]) -> dict[Role, int]:

@@ -22,12 +22,14 @@ from fmu_build.generate.picked_files import STEPS as OF_STEPS
 from fmu_build.generate.sources import LAYER, layer_files, source_file_names, source_files
 from fmu_build.storage.cache import cache_folder
 from supervessel.rotation.propagators import PROPAGATORS
-from support import ISS_DG, body, built, scene, variant
+from support import ISS_DG, OK, Instance, body, built, scene, variant
 from support.costs import station
 from support.marks import FMI
 
 STEP, STEPS = 0.1, 100
 """s, and how many: long enough for a difference of one ulp to grow."""
+
+PILOT = Path(__file__).with_name("pilot.c")
 
 INPUTS = {"DG.mass": 12000.0, "torque[1]": 900.0, "torque[2]": -1500.0, "angular_velocity_start[3]": 0.02}
 
@@ -90,7 +92,8 @@ def compiled(folder: Path, fmi: int, command: list[str], optimised: str = "-O2")
     """Compiles an FMU unpacked in `folder` and puts the library in the place of its own."""
     library = next(folder.glob("binaries/*/*"))
     library.unlink()
-    run_compiler(folder, fmi, command, optimised, "-shared", "-o", str(library), "-lm")
+    plain = f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX"
+    run_compiler(folder, fmi, command, optimised, plain, "-shared", "-o", str(library), "-lm")
     return library
 
 
@@ -188,12 +191,6 @@ def test_a_file_of_the_layer_opens_with_its_subject_and_names_only_python_that_i
         assert (root / name).is_file() or (root / "model" / name).is_file(), name
 
 
-@FMI
-def test_no_source_file_fixes_a_prefix_of_the_function_names(fmi):
-    for name, text in packed_sources(fmi).items():
-        assert "FUNCTION_PREFIX" not in text, name
-
-
 def test_build_description_obeys_its_schema():
     schema = etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "schema/fmi3/fmi3BuildDescription.xsd"))
     schema.assertValid(etree.fromstring(source_files(GENERATED, 3, "name")["sources/buildDescription.xml"]))
@@ -231,24 +228,119 @@ def test_the_sources_compile_to_a_library_with_bit_identical_results(tmp_path, f
     assert flight(tmp_path).tobytes() == expected.tobytes()
 
 
+# Several FMUs in one program.
+
+FMI_2_HEADER = """\
+#include "{folder}/fmi2TypesPlatform.h"
+#include "{folder}/fmi2FunctionTypes.h"
+#if !defined(FMI2_OVERRIDE_FUNCTION_PREFIX) && defined(FMI2_FUNCTION_PREFIX)
+#define fmi2Paste(a, b) a##b
+#define fmi2PasteB(a, b) fmi2Paste(a, b)
+#define fmi2FullName(name) fmi2PasteB(FMI2_FUNCTION_PREFIX, name)
+#else
+#define fmi2FullName(name) name
+#endif
+#define fmi2Version "2.0"
+"""
+"""How the standard's header begins; FMPy's has been changed so that it never puts a prefix."""
+
+
+def standard_headers(folder: Path) -> Path:
+    """Returns a folder with the headers of both versions that put prefixes before the functions' names."""
+    made = folder / "headers"
+    shutil.copytree(fmi_headers(), made)
+    declared = re.findall(r"FMI2_Export\s+\w+TYPE\s+(\w+);", (made / "fmi2Functions.h").read_text())
+    text = FMI_2_HEADER.format(folder=fmi_headers())
+    text += "".join(f"#define {name} fmi2FullName({name})\n{name}TYPE {name};\n" for name in declared)
+    (made / "fmi2Functions.h").write_text(text)
+    return made
+
+
+PROGRAM = """\
+#include <stdio.h>
+#include <stddef.h>
+{declarations}
+int main(void) {{
+    const double values[] = {{0.02, 900.0}};
+    double read[7];
+    int ok = 1;
+{begin}
+    for (int i = 0; i < {steps}; i++) {{
+{step}
+    }}
+{end}
+    return ok ? 0 : 1;
+}}
+"""
+DECLARATIONS = """\
+int {pilot}_begin(const char *token, const unsigned references[], const double values[], size_t count);
+int {pilot}_step(double time, double h);
+int {pilot}_read(const unsigned references[], double values[], size_t count);
+static const unsigned {pilot}_set[] = {{{set}}}, {pilot}_out[] = {{{out}}};
+"""
+SET = ("angular_velocity_start[3]", "torque[1]")
+READ = ("state.attitude", "state.angular_velocity")
+
+
+def program(pilots: dict[str, Instance]) -> str:
+    """Returns C that flies FMUs step by step, turn by turn, and prints the states at the end of each."""
+
+    def lines(form: str) -> str:
+        return "\n".join(form.format(pilot=pilot, token=it.description.guid) for pilot, it in pilots.items())
+
+    declarations = ""
+    for pilot, it in pilots.items():
+        names = [name for group in READ for name in it.names(group)]
+        references = [", ".join(str(it.references[name]) for name in some) for some in (SET, names)]
+        declarations += DECLARATIONS.format(pilot=pilot, set=references[0], out=references[1])
+    return PROGRAM.format(
+        declarations=declarations,
+        steps=STEPS,
+        begin=lines('    ok = ok && {pilot}_begin("{token}", {pilot}_set, values, 2);'),
+        step=lines(f"        ok = ok && {{pilot}}_step(i * {STEP}, {STEP});"),
+        end=lines(
+            "    ok = ok && {pilot}_read({pilot}_out, read, 7);\n"
+            "    for (int i = 0; i < 7; i++) printf(\"%a%c\", read[i], i < 6 ? ' ' : '\\n');"
+        ),
+    )
+
+
+def test_the_sources_of_fmus_of_both_versions_are_linked_into_one_program_and_fly(tmp_path):
+    headers, pilots, objects = standard_headers(tmp_path), {}, []
+    gcc = [*COMPILERS["gcc"], "-O0", "-I", str(headers)]
+    for fmi in (2, 3):
+        for raw in (ISS_DG, {**body(), "inputs": {"torque": True}}):
+            folder = tmp_path / f"{raw['name']}_{fmi}"
+            fmpy.extract(str(built(raw, fmi)), unzipdir=str(folder))
+            run_compiler(folder, fmi, gcc, "-c")
+            prefix = f"-DFMI{fmi}_FUNCTION_PREFIX={raw['name']}_"
+            pilot = folder / "pilot.o"
+            command = [*gcc, f"-DFMI={fmi}", prefix, "-c", str(PILOT), "-o", str(pilot)]
+            subprocess.run(command, check=True, timeout=60.0)
+            objects += [*map(str, folder.glob("sources/*.o")), str(pilot)]
+            pilots[f"{raw['name']}_pilot{fmi}"] = Instance(raw, fmi)
+    main = tmp_path / "main.c"
+    main.write_text(program(pilots))
+    subprocess.run([*gcc, str(main), *objects, "-lm", "-o", str(tmp_path / "all")], check=True, timeout=60.0)
+    flown = subprocess.run([str(tmp_path / "all")], capture_output=True, text=True, check=True, timeout=60.0)
+    for instance, line in zip(pilots.values(), flown.stdout.splitlines(), strict=True):
+        assert instance.initialise(**dict(zip(SET, (0.02, 900.0), strict=True))) == OK
+        for i in range(STEPS):
+            instance.time = i * STEP
+            assert instance.step(STEP) == OK
+        assert [float.fromhex(number) for number in line.split()] == [
+            number for group in READ for number in instance.get(group)
+        ]
+        instance.free()
+
+
 @FMI
-def test_all_names_that_a_linker_sees_are_fmis_or_begin_with_the_models(tmp_path, fmi):
+def test_a_shared_library_made_of_the_sources_has_the_plain_names(tmp_path, fmi):
+    """The macro is that of the standard's headers (FMI 2.0.4: 2.1.1), which FMPy, too, defines to compile."""
     fmpy.extract(str(built(ISS_DG, fmi)), unzipdir=str(tmp_path))
-    names = exported(compiled(tmp_path, fmi, COMPILERS["gcc"], "-O0"))
+    headers, library = standard_headers(tmp_path), tmp_path / "plain.so"
+    options = ["-O0", f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX", "-shared", "-o", str(library), "-lm"]
+    run_compiler(tmp_path, fmi, [*COMPILERS["gcc"], "-I", str(headers)], *options)
+    names = exported(library)
     assert f"fmi{fmi}DoStep" in names
-    assert not [name for name in names if not name.startswith((f"fmi{fmi}", "iss_dg_"))]
-
-
-def test_fmus_linked_into_one_program_with_prefixes_do_not_clash(tmp_path):
-    """For FMI 3.0 only: FMPy's header of FMI 2.0 is changed so that it never puts a prefix."""
-    objects: list[str] = []
-    for raw in (ISS_DG, body()):
-        folder = tmp_path / raw["name"]
-        fmpy.extract(str(built(raw)), unzipdir=str(folder))
-        run_compiler(folder, 3, COMPILERS["gcc"], "-O0", f"-DFMI3_FUNCTION_PREFIX={raw['name']}_", "-c")
-        objects += map(str, folder.glob("sources/*.o"))
-    both = tmp_path / "both.so"
-    subprocess.run(["gcc", "-shared", "-o", str(both), *objects, "-lm"], check=True, timeout=60.0)
-    names = exported(both)
-    assert {"iss_dg_fmi3DoStep", "body_fmi3DoStep"} <= names
-    assert not [name for name in names if name.startswith("fmi")]
+    assert not [name for name in names if not name.startswith((f"fmi{fmi}", f"iss_dg_fmi{fmi}_"))]

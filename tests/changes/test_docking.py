@@ -8,7 +8,7 @@ from hypothesis import Phase, given, settings
 from changes.histories import ByExchange, ByFmu, ByTwin, Driver, Values, elements
 from changes.scenes import MIR
 from supervessel import reference
-from support import DISCARD, EPS, OK, Instance, scene
+from support import EPS, OK, Instance, refusal, scene
 from support.marks import FMI
 
 MIR_RATE = np.array(MIR["rotation"]["angular_velocity"])
@@ -75,7 +75,7 @@ def test_an_occupied_port_is_refused_by_name(fmi):
     assert instance.step(0.1) == OK
     rate, attitude = (instance.get(name).tolist() for name in ("angular_velocity", "attitude"))
     assert instance.set({"front.docked": 1.0}) == OK
-    assert instance.step(0.1) == DISCARD
+    assert instance.step(0.1) == refusal(fmi)
     assert "front.docked = true: port DG.nose is docked already" in instance.messages()[-1]
     assert instance.set({"front.docked": 0.0}) == OK
     assert instance.get("angular_velocity").tolist() == rate

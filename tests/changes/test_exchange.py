@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from changes.histories import ByEvents, ByExchange, ByFmu, Values, elements, start_values
 from changes.scenes import DURATION, MIXED, STEADY, TORQUE, TUG, TUG_EVENTS, drawn_in
 from supervessel import reference
-from support import DISCARD, EPS, ERROR, OK, Instance, scene, variant
+from support import EPS, ERROR, OK, Instance, refusal, scene, variant
 from support.marks import FMI
 
 FLIGHT_ERROR = 1e-10
@@ -171,7 +171,7 @@ def test_a_change_that_cannot_be_is_refused_by_name_and_leaves_the_state(kind, f
     kept = [*driver.angular_velocity, *driver.attitude]
     back = {name: instance.get(name) for name in wrong}
     assert instance.set(wrong) == OK
-    assert instance.step(0.5) == DISCARD
+    assert instance.step(0.5) == refusal(fmi)
     assert message in instance.messages()[-1]
     assert instance.set(back) == OK
     assert [*driver.angular_velocity, *driver.attitude] == kept

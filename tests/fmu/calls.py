@@ -1,6 +1,6 @@
 """An instance in any state of its life whose C functions are called by name, with any arguments."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from ctypes import byref, c_bool, c_double, c_int, c_size_t, c_uint
 from typing import Any
 
@@ -19,10 +19,16 @@ class Raw:
     The functions of both interfaces are there, whichever the instance is of.
     """
 
-    def __init__(self, fmi: int, state: str = "cs, instantiated", **arguments: Any) -> None:
+    def __init__(
+        self,
+        fmi: int,
+        state: str = "cs, instantiated",
+        scene: Mapping[str, Any] = RAW,
+        **arguments: Any,
+    ) -> None:
         interface, state = state.split(", ")
         self.exchange = interface == "me"
-        self.instance = Instance(RAW, fmi, exchange=self.exchange, **arguments)
+        self.instance = Instance(scene, fmi, exchange=self.exchange, **arguments)
         self.fmi, self.fmu = fmi, self.instance.fmu
         self.functions = dict(self.fmu._functions)
         if fmi == 2:  # FMPy keeps the functions of the two interfaces apart

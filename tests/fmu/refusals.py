@@ -22,13 +22,13 @@ def outputs(instance: Instance) -> list[float]:
     return list(getter([instance.references[name] for name in names]))
 
 
-def last_successful_time(instance: Instance, h: float) -> float:
-    """Takes a step that is discarded; returns the time that the instance says it has reached."""
+def last_successful_time(instance: Instance, h: float, status: int = DISCARD) -> float:
+    """Takes a step that is refused with a status; returns the time that the instance says it has reached."""
     if instance.fmi == 2:
-        assert instance.step(h) == DISCARD
+        assert instance.step(h) == status
         return instance.fmu.getRealStatus(fmi2LastSuccessfulTime)
     flags, time = [fmi3Boolean(True) for _ in range(3)], fmi3Float64(NAN)
     step = instance.fmu._functions["fmi3DoStep"]
-    assert step(instance.fmu.component, instance.time, h, True, *flags, time) == DISCARD
+    assert step(instance.fmu.component, instance.time, h, True, *flags, time) == status
     assert [flag.value for flag in flags] == [False, False, False]
     return time.value

@@ -31,7 +31,6 @@ MISUSES = {
     "a state": (["state.attitude[1]"], ["DG.mass"], ROLE.format("an unknown")),
     "by an output": (["mass"], ["mass"], "mass " + ROLE.format("a known")),
     "by a rate": (["mass"], ["der(state.attitude[1])"], ROLE.format("a known")),
-    "by a parameter": (["mass"], ["attitude_start[1]"], ROLE.format("a known")),
     "good, then bad": (["mass", "pmi[1]"], ["DG.mass", "mass"], "mass " + ROLE.format("a known")),
 }
 
@@ -67,11 +66,25 @@ def test_a_variable_of_the_wrong_kind_is_an_error_that_names_it(fmi, misuse, adj
 
 @pytest.mark.parametrize("known", ["state.attitude[1]", "time", "attitude_start[1]"])
 @FMI
-def test_states_are_unknowns_and_start_parameters_knowns_only_while_initialising(fmi, known):
+def test_states_are_unknowns_while_initialising_and_start_parameters_knowns(fmi, known):
     instance, _ = initialising("tensor", 1.0, fmi)
     references = [instance.references[name] for name in ("state.attitude[2]", known)]
     status = ask(instance, references[:1], references[1:], [1.0], [0.0])
     assert status == (ERROR if known.startswith("state") else OK)
+    instance.free()
+
+
+@WAY
+def test_a_start_parameter_changes_nothing_once_the_states_are_given(fmi, adjoint):
+    """No equation holds it then: it is in no `dependencies` but those of InitialUnknowns."""
+    instance = standing("tensor", values("tensor", "start"), fmi)
+    rows, by = ["kinetic_energy", "attitude[1]", "mass"], ["angular_velocity_start[1]", "attitude_start[2]"]
+    if adjoint:
+        assert instance.adjoint(rows, [*by, "DG.mass"], [1.0, 1.0, 1.0])[:2].tolist() == [0.0, 0.0]
+    else:
+        assert instance.directional(rows, by, [1.0, 1.0]).tolist() == [0.0, 0.0, 0.0]
+        assert instance.directional(rows, [*by, "DG.mass"], [1.0, 1.0, 1.0])[2] == 1.0
+    assert instance.messages() == []
     instance.free()
 
 

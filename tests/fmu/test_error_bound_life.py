@@ -10,7 +10,7 @@ from changes.scenes import drawn_in
 from fmu.bounds import CONTACT, showing, tug
 from fmu.listeners import Listener
 from fmu.saved_states import bytes_of, restore, save
-from support import DISCARD, ERROR, OK, Instance, body
+from support import DISCARD, ERROR, OK, Instance, body, refusal
 from support.marks import FMI, KIND
 
 RAW = tug("principal", mass="momentum")
@@ -89,7 +89,8 @@ def test_a_refused_step_leaves_it(fmi, raw, refused):
         instance.free()
         other.free()
         return
-    assert set(statuses) == {DISCARD}
+    too_long = refused in ("h", {"torque[1]": 1.7e308})
+    assert set(statuses) == {DISCARD if too_long else refusal(fmi)}
     assert instance.get("error_bound").hex() == flights[0][-1]
     assert fly(instance, FLIGHT[3:]) == fly(other, FLIGHT[3:])
     instance.free()

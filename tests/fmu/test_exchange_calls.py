@@ -1,103 +1,18 @@
-"""Functions of model exchange: the states that allow them, their arrays."""
+"""Functions of model exchange: what they tell, their arrays (when: test_calling_sequences.py)."""
 
-from collections.abc import Callable
-from ctypes import byref, c_bool, c_double, c_int, c_void_p
+from ctypes import byref, c_bool, c_double
 from typing import Any
 
 import numpy as np
 import pytest
 
-from fmu.exchange import RATES, RAW, get_rates, raw_call, raw_update, start
-from support import DISCARD, ERROR, OK, STATES, Instance
+from fmu.exchange import RATES, raw_call, start
+from support import ERROR, STATES, Instance
 from support.marks import FMI
 
 
 def update(instance: Instance) -> Any:
     return (instance.fmu.updateDiscreteStates if instance.fmi == 3 else instance.fmu.newDiscreteStates)()
-
-
-MOMENTS = ("instantiated", "initialising", "event", "continuous", "terminated", "after an error")
-
-
-def completed(instance: Instance) -> int:
-    kind = c_bool if instance.fmi == 3 else c_int
-    return raw_call("CompletedIntegratorStep", True, byref(kind()), byref(kind()))(instance)
-
-
-# O: ok, E: error, in the order of MOMENTS; FMI 2, FMI 3; what is called.
-CALLS: dict[str, tuple[str, str, Callable[[Instance], int]]] = {
-    "EnterEventMode": ("EEOOEE", "EEEOEE", raw_call("EnterEventMode")),
-    "discrete states": ("EEOEEE", "EEOEEE", raw_update),
-    "EnterContinuousTimeMode": ("EEOEEE", "EEOEEE", raw_call("EnterContinuousTimeMode")),
-    "CompletedIntegratorStep": ("EEEOEE", "EEEOEE", completed),
-    "SetTime": ("EEOOEE", "EEOOEE", raw_call("SetTime", 1.5)),
-    "SetContinuousStates": (
-        "EEEOEE",
-        "EEEOEE",
-        raw_call("SetContinuousStates", (c_double * 7)(1, 0, 0, 0, 1, 2, 3), 7),
-    ),
-    "GetContinuousStates": ("EOOOOO", "EOOOOO", raw_call("GetContinuousStates", (c_double * 7)(), 7)),
-    "derivatives": ("EOOOOO", "EOOOOO", get_rates),
-    "GetEventIndicators": ("EOOOOO", "EOOOOO", raw_call("GetEventIndicators", None, 0)),
-    "nominals": (
-        "OOOOOO",
-        "OOOOOO",
-        raw_call("GetNominalsOfContinuousStates", (c_double * 7)(), 7),
-    ),
-    "get an output": ("EOOOOO", "OOOOOO", lambda i: i.get_status("mass")),
-    "get a state": ("EOOOOO", "OOOOOO", lambda i: i.get_status("state.attitude[1]")),
-    "set an input": ("OOOOEE", "OOOOEE", lambda i: i.set({"DG.mass": 2e4})),
-    "set a parameter": ("OOEEEE", "OOEEEE", lambda i: i.set({"attitude_start[2]": 0.1})),
-    "set a state": ("EEOOEE", "EEOOEE", lambda i: i.set({"state.attitude[2]": 0.1})),
-    "set a rate": ("EEEEEE", "EEEEEE", lambda i: i.set({"der(state.attitude[2])": 0.1})),
-    "ExitInitializationMode": ("EOEEEE", "EOEEEE", raw_call("ExitInitializationMode")),
-    "Terminate": ("EEOOEE", "EEOOEE", raw_call("Terminate")),
-    "Reset": ("OOOOOO", "OOOOOO", raw_call("Reset")),
-}
-CALL = pytest.mark.parametrize("name", CALLS)
-
-
-@CALL
-@FMI
-def test_each_call_is_answered_in_the_states_that_allow_it_and_else_logs_one_line(fmi, name):
-    two, three, call = CALLS[name]
-    found = ""
-    for moment in MOMENTS:
-        instance = start(fmi=fmi, mode=moment)
-        status = call(instance)
-        found += {OK: "O", DISCARD: "D", ERROR: "E"}[status]
-        assert len(instance.messages()) == (status != OK), (moment, instance.messages())
-        instance.free()
-    assert found == (two if fmi == 2 else three)
-
-
-@pytest.mark.parametrize(
-    ("fmi", "function", "arguments"),
-    [
-        (2, "fmi2DoStep", (0.0, 0.1, 1)),
-        (3, "fmi3DoStep", (0.0, 0.1, True, c_bool(), c_bool(), c_bool(), c_double())),
-        (3, "fmi3GetOutputDerivatives", (None, 0, None, None, 0)),
-    ],
-)
-def test_functions_of_co_simulation_are_refused(fmi, function, arguments):
-    instance = start(fmi=fmi)
-    call = instance.fmu.dll[function]  # FMPy does not keep these for model exchange
-    if fmi == 2:
-        call.argtypes = [c_void_p, c_double, c_double, c_int]
-    else:
-        call.argtypes = instance.fmu._functions[function].argtypes
-    assert call(instance.fmu.component, *arguments) == ERROR
-    assert instance.messages() == [f"{function}: must not be called in continuous-time mode"]
-    instance.free()
-
-
-@pytest.mark.parametrize("name", list(CALLS)[:10])
-def test_functions_of_model_exchange_are_refused_in_co_simulation(name):
-    instance = Instance(RAW)
-    assert instance.initialise() == OK
-    assert CALLS[name][2](instance) == ERROR
-    assert instance.messages()[0].endswith("must not be called between steps")
-    instance.free()
 
 
 @FMI

@@ -10,7 +10,7 @@ import pytest
 from fmpy import extract
 
 from supervessel import Twin
-from support import ISS_DG, TURNING, body, built, relative_error, scene, variant
+from support import ISS_DG, TURNING, U, body, built, relative_error, scene, variant
 from support.marks import FMI
 from support.pages import text
 
@@ -119,6 +119,18 @@ def test_variables_have_the_twins_names_and_order(fmi, name):
     assert dae.x() == list(t.x_names)
     assert dae.u() == [*t.p_names, *t.u_names]
     assert dae.y() == list(t.y_names)
+
+
+@NAME
+@FMI
+def test_it_starts_from_the_scenes_states_and_goes_on_from_there(fmi, name):
+    dae, t = builder(name, fmi), twin(name)
+    start = [float(value) for value in dae.start(dae.x())]
+    assert start == pytest.approx(t.x_start, rel=0.0, abs=4 * U)
+    assert np.linalg.norm(start[:4]) == pytest.approx(1.0, abs=4 * U)
+    u = [float(value) for value in dae.start(dae.u())]
+    rate, still = np.array(imported(name, fmi)(start, u)[0]).ravel(), np.zeros(len(t.u_names))
+    assert rate == pytest.approx(np.array(t.ode(t.x_start, still, t.p_start)).ravel(), abs=1e-15)
 
 
 @POINT

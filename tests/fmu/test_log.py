@@ -2,7 +2,7 @@
 
 import pytest
 
-from support import DISCARD, ERROR, ISS_DG, OK, Instance, flying
+from support import DISCARD, ERROR, ISS_DG, NAN, OK, Instance, flying
 from support.marks import FMI
 
 
@@ -10,8 +10,7 @@ def provoke(instance: Instance) -> None:
     """Gives an initialised instance a reason for a line of each category."""
     instance.set({"DG.mass": instance.get("DG.mass") / 2.0})
     instance.step(0.1)
-    instance.set({"DG.mass": -1.0})
-    instance.step(0.1)
+    instance.set({"DG.mass": NAN})
     instance.set({"mass": 1.0})
 
 
@@ -35,11 +34,58 @@ def test_only_the_categories_turned_on_are_logged(fmi, categories, logged):
     instance.free()
 
 
+@pytest.mark.parametrize(
+    ("calls", "logged"),
+    [
+        ([(False, ["logComposite"])], {"logStatusDiscard", "logStatusError"}),
+        (
+            [(False, []), (True, ["logComposite"]), (True, ["logStatusError"])],
+            {"logComposite", "logStatusError"},
+        ),
+        ([(True, ["logComposite"])], {"logComposite", "logStatusDiscard", "logStatusError"}),
+        (
+            [(False, ["logStatusError", "logComposite"]), (True, ["logComposite"])],
+            {"logComposite", "logStatusDiscard"},
+        ),
+        ([(False, ["logAll"]), (True, ["logStatusDiscard"])], {"logStatusDiscard"}),
+    ],
+)
+@FMI
+def test_categories_are_added_and_removed_and_the_others_stay(fmi, calls, logged):
+    """FMI 2.0.4, 2.1.5; FMI 3.0, 2.3.1: loggingOn is about the categories named, or about all if none is."""
+    instance = Instance(ISS_DG, fmi)
+    for on, categories in calls:
+        assert instance._status(instance.fmu.setDebugLogging, on, categories) == OK
+    instance.initialise()
+    provoke(instance)
+    assert {category for _, category, _ in instance.log} == logged
+    instance.free()
+
+
+@pytest.mark.parametrize("on", [True, False])
+@FMI
+def test_an_unknown_category_is_an_error_and_changes_no_other(fmi, on):
+    """The allowed names are those of the model description (FMI 2.0.4: 2.1.5, FMI 3.0: 2.3.1)."""
+    instance = Instance(ISS_DG, fmi)
+    assert instance._status(instance.fmu.setDebugLogging, on, ["logComposite", "logNoise"]) == ERROR
+    message = f"fmi{fmi}SetDebugLogging: category 2 is not one of the model description's"
+    assert instance.log == [(ERROR, "logStatusError", message)]
+    instance.reset()
+    instance.initialise()
+    provoke(instance)
+    assert {category for _, category, _ in instance.log} == {
+        "logComposite",
+        "logStatusDiscard",
+        "logStatusError",
+    }
+    instance.free()
+
+
 @FMI
 def test_the_categories_are_those_of_the_model_description(fmi):
     instance = Instance(ISS_DG, fmi)
     declared = [category.name for category in instance.description.logCategories]
-    assert declared == ["logStatusDiscard", "logStatusError", "logComposite", "logAll"]
+    assert declared == ["logStatusDiscard", "logStatusError", "logComposite", "logTolerance", "logAll"]
     for category in declared:
         assert instance._status(instance.fmu.setDebugLogging, True, [category]) == OK
     instance.free()

@@ -321,9 +321,9 @@ def test_start_values_are_what_a_new_instance_returns(raw, fmi):
 
 @FMI
 @SCENE
-def test_what_is_calculated_and_time_have_no_start_value(raw, fmi):
+def test_outputs_rates_and_time_have_no_start_value(raw, fmi):
     started = [name for name, variable in variables(raw, fmi).items() if "start" in variable]
-    assert started == [*input_names(raw), *PARAMETERS]
+    assert started == [*input_names(raw), *PARAMETERS, *STATES]
 
 
 @FMI
@@ -334,7 +334,8 @@ def test_causality_variability_and_initial_follow_from_the_role(raw, fmi):
         **dict.fromkeys(input_names(raw), ("input", "continuous", None)),
         **dict.fromkeys(PARAMETERS, ("parameter", "fixed", "exact")),
         **dict.fromkeys(output_names(raw), ("output", "continuous", "calculated")),
-        **dict.fromkeys([*STATES, *RATES], ("local", "continuous", "calculated")),
+        **dict.fromkeys(STATES, ("local", "continuous", "approx")),
+        **dict.fromkeys(RATES, ("local", "continuous", "calculated")),
     }
     found = variables(raw, fmi).items()
     assert {n: (v.get("causality"), v.get("variability"), v.get("initial")) for n, v in found} == roles

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fmu.refusals import SINGLE, last_successful_time, outputs
-from support import DISCARD, EPS, ERROR, INF, ISS_DG, NAN, OK, Instance, flying, variant
+from support import DISCARD, EPS, ERROR, INF, ISS_DG, NAN, OK, Instance, flying, refusal, variant
 from support.marks import FMI
 
 TUMBLING = variant(
@@ -93,11 +93,6 @@ REFUSALS: dict[str, tuple[Mapping[str, Any], dict[str, Any], str]] = {
 }
 REFUSAL = pytest.mark.parametrize(("raw", "bad", "text"), REFUSALS.values(), ids=REFUSALS.keys())
 INDEPENDENT = ("attitude", "angular_velocity", "state.attitude", "state.angular_velocity")
-
-
-def refusal(fmi: int) -> int:
-    """Returns the status of a refusal where only FMI 3.0 knows Discard."""
-    return DISCARD if fmi == 3 else ERROR
 
 
 # Not finite: refused by set.
@@ -220,7 +215,7 @@ def test_unusable_values_are_refused_by_a_step(fmi, raw, bad, text):
     with flying(raw, fmi) as instance:
         instance.step(0.5)
         instance.set(bad)
-        assert instance.step(0.5) == DISCARD
+        assert instance.step(0.5) == refusal(fmi)
         [message] = instance.messages()
         assert message.startswith(f"fmi{fmi}DoStep: ")
         assert text in message
@@ -316,7 +311,7 @@ def test_a_refused_step_says_that_it_has_not_moved(fmi, raw, bad, text):
     with flying(raw, fmi, start=3.0) as instance:
         instance.step(0.5)
         instance.set(bad)
-        assert last_successful_time(instance, 0.25) == 3.5
+        assert last_successful_time(instance, 0.25, refusal(fmi)) == 3.5
         assert instance.get("time") == 3.5
 
 
@@ -333,12 +328,11 @@ def test_a_refused_episode_leaves_no_trace_once_corrected(fmi, raw, bad, text, f
             assert instance.step(0.5) == OK
             if instance is disturbed:
                 assert instance.set(bad) == OK
-                assert [instance.step(0.1), instance.step(0.7)] == [DISCARD, DISCARD]
-                if fmi == 3:
-                    assert instance.get_status("mass") in (OK, DISCARD)
-                    assert instance.get_status("inertia") == DISCARD
+                assert [instance.step(0.1), instance.step(0.7)] == [refusal(fmi)] * 2
+                assert instance.get_status("mass") in (OK, refusal(fmi))
+                assert instance.get_status("inertia") == refusal(fmi)
                 instance.get("attitude")
-                assert instance.step(0.1) == DISCARD
+                assert instance.step(0.1) == refusal(fmi)
             assert instance.set(good) == OK
             run = [outputs(instance)]
             for _ in range(3):
@@ -349,13 +343,14 @@ def test_a_refused_episode_leaves_no_trace_once_corrected(fmi, raw, bad, text, f
 
 
 @REFUSAL
-def test_initialisation_ends_once_the_values_are_corrected(raw, bad, text):
-    with flying(raw) as fresh:
-        instance = Instance(raw)
+@FMI
+def test_initialisation_ends_once_the_values_are_corrected(fmi, raw, bad, text):
+    with flying(raw, fmi) as fresh:
+        instance = Instance(raw, fmi)
         instance.enter()
         good = {name: instance.get(name) for name in bad}
         instance.set(bad)
-        assert [instance.exit(), instance.exit()] == [DISCARD, DISCARD]
+        assert [instance.exit(), instance.exit()] == [refusal(fmi)] * 2
         instance.set(good)
         assert instance.exit() == OK
         assert [instance.step(0.5), fresh.step(0.5)] == [OK, OK]
@@ -407,9 +402,9 @@ def test_a_port_is_turned_and_moments_are_set_one_scalar_at_a_time_in_every_orde
             assert instance.set({name: value}) == OK
             # At rest without torque a step that is taken leaves the state as it is.
             statuses = [instance.step(0.5)] if state == "stepping" else []
-            statuses += [instance.get_status("pmi[1]")] if fmi == 3 else []
-            assert set(statuses) <= {OK, DISCARD}, (order, name)
-            refused += DISCARD in statuses
+            statuses.append(instance.get_status("pmi[1]"))
+            assert set(statuses) <= {OK, refusal(fmi)}, (order, name)
+            refused += refusal(fmi) in statuses
         if state == "initialising":
             assert instance.exit() == OK
         results.add(tuple(outputs(instance)[1:]))

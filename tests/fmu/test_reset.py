@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fmu.programmes import SEED, SPINNING, alone, exchange, outputs, programme
-from support import DISCARD, ERROR, ISS_DG, OK, Instance, draw_inputs, flying
+from support import DISCARD, ERROR, ISS_DG, OK, Instance, draw_inputs, flying, refusal
 from support.marks import FMI
 
 
@@ -19,7 +19,7 @@ def spoil(instance: Instance, moment: str) -> None:
         assert instance.step(0.5) == OK
     if moment == "with unusable inputs":
         assert instance.set({"DG.mass": -1.0}) == OK
-        assert instance.step(0.1) == DISCARD
+        assert instance.step(0.1) == refusal(instance.fmi)
     if moment == "terminated":
         assert instance._status(instance.fmu.terminate) == OK
     if moment == "after an error":

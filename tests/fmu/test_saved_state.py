@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from fmu.saved_states import bytes_of, function, restore, save
-from support import DISCARD, ERROR, ISS_DG, OK, TURNING, Instance, body, draw_inputs, variant
+from support import DISCARD, ERROR, ISS_DG, OK, TURNING, Instance, body, draw_inputs, refusal, variant
 from support.marks import FMI, KIND
 
 SEED = 20240613
@@ -54,7 +54,7 @@ def start(fmi: int, exchange: bool, moment: str, seed: int = SEED) -> Instance:
         if exchange:
             assert instance.get_status("mass") == DISCARD
         else:
-            assert instance.step(0.5) == DISCARD
+            assert instance.step(0.5) == refusal(fmi)
     if moment == "terminated":
         assert instance._status(instance.fmu.terminate) == OK
     if moment == "after an error":

@@ -56,9 +56,28 @@ def test_times_beyond_rounding_are_not_taken_for_it(fmi, start):
         instance.time += shift
         assert instance.step(h) == ERROR
         instance.free()
-    instance = Instance(SPINNING, fmi)
-    assert instance.initialise(start, stop=start + h) == OK
-    assert instance.step(h + slack) == ERROR
+    for shift, status in ((0.9e-9 * h, OK), (1.1e-9 * h + slack, ERROR)):
+        instance = Instance(SPINNING, fmi)
+        assert instance.initialise(start, stop=start + h) == OK
+        assert instance.step(h + shift) == status
+        instance.free()
+
+
+@pytest.mark.parametrize(("start", "h", "steps"), [(0.0, 0.1, 6000), (0.0, 1e-3, 20_000)])
+@FMI
+def test_an_importer_that_adds_step_sizes_up_reaches_the_stop_time_that_is_their_product(
+    fmi, start, h, steps
+):
+    instance = Instance(body(law="none"), fmi)
+    assert instance.initialise(start, stop=start + steps * h) == OK
+    time = start
+    for i in range(steps):
+        instance.time = time
+        if instance.step(h) != OK:
+            pytest.fail(f"step {i}: {instance.messages()}")
+        time += h
+    assert time > start + steps * h  # else nothing is asked of the last step
+    assert instance.step(h) == ERROR
     instance.free()
 
 

@@ -162,7 +162,14 @@ def fuzzer(fmi: int, propagator: str, flags: tuple[str, ...]) -> Path:
     with zipfile.ZipFile(built(raw, fmi)) as archive:
         archive.extractall(folder)
     sources = folder / "sources"
-    common = [compiler(), "-std=c99", "-ffp-contract=off", *flags, f"-DFMI={fmi}"]
+    common = [
+        compiler(),
+        "-std=c99",
+        "-ffp-contract=off",
+        *flags,
+        f"-DFMI={fmi}",
+        f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX",
+    ]
     common += ["-I", str(sources), "-isystem", str(fmi_headers())]
     own, program = folder / "fuzz.o", folder / "fuzz"
     run([*common, *STRICT, "-c", str(Path(__file__).with_name("fuzz.c")), "-o", str(own)])

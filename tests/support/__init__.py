@@ -10,6 +10,7 @@ from support.fmus import (
     Instance,
     built,
     flying,
+    refusal,
     store,
     unpacked,
 )
@@ -53,6 +54,7 @@ __all__ = [
     "flying",
     "hamilton",
     "random_rotation",
+    "refusal",
     "relative_error",
     "scene",
     "store",

@@ -30,6 +30,13 @@ from support.traps import watch
 
 OK, WARNING, DISCARD, ERROR = range(4)
 
+
+def refusal(fmi: int) -> int:
+    """Returns the status of a refused value where only FMI 3.0 knows Discard, and of a step that it prevents:
+    to FMI 2.0's masters Discard means that a shorter one may do (4.2.2)."""
+    return DISCARD if fmi == 3 else ERROR
+
+
 STATES = [
     *(f"state.attitude[{i}]" for i in (1, 2, 3, 4)),
     *(f"state.angular_velocity[{i}]" for i in (1, 2, 3)),

@@ -176,7 +176,7 @@ def state_variables(scene: Scene) -> tuple[StateVariable, ...]:
         StateVariable(
             f"state.{kind.name}[{i + 1}]",
             kind.unit,
-            f"state: {description}, {label}",
+            f"state: {description}, {label}; it starts from the start parameters",
             group=f"state.{kind.name}",
             element=i,
             kind=kind,

@@ -118,7 +118,7 @@ static Answer enter(Slot *slot) {
     const double tolerance = once_in(20) ? odd_number() : pow(10.0, uniform(-15.0, -1.0));
     const bool used = given && ERROR_CONTROLLED && !slot->exchange;
     const bool right =
-        isfinite(start) && (!stops || stop >= start) && (!used || (tolerance >= 1e-15 && tolerance <= 0.1));
+        isfinite(start) && (!stops || stop >= start) && (!used || (isfinite(tolerance) && tolerance >= 0.0));
     Answer answer = {OK, expect(slot, INSTANTIATED, right)};
 #if FMI == 3
     called = "fmi3EnterInitializationMode";
@@ -181,7 +181,7 @@ static Answer set_logging(Slot *slot) {
     Answer answer = {OK, right ? FINE : AN_ERROR};
     answer.status = (int)EITHER(fmi2SetDebugLogging, fmi3SetDebugLogging)(slot->component, on, count,
                                                                           null ? NULL : chosen);
-    if (answer.status == OK) slot->log_mask = on && slot->has_log ? mask : 0;
+    if (answer.status == OK && slot->has_log) slot->log_mask = on ? slot->log_mask | mask : slot->log_mask & ~mask;
     return answer;
 }
 

@@ -5,17 +5,13 @@
 #include "functions.h"
 
 /* Whether a variable reads the same in this state before and after a call that was not answered with OK. */
-static bool comparable(const Slot *slot, unsigned state, int status, unsigned reference) {
+static bool comparable(unsigned state, bool ended, unsigned reference) {
     const Role role = VARIABLES[reference].role;
     if (role == ROLE_TIME || role == ROLE_INPUT || role == ROLE_PARAMETER) return true;
-    const bool reading_may_end_it = FMI == 2 && !slot->exchange;
-    if (state & BEFORE_START) return status == DISCARD && !reading_may_end_it;
-    if (!reading_may_end_it) return true;
-    if (role == ROLE_STATE) return !CHANGES || reference < REFERENCE_STATES + 4;
-    return reference >= attitude_reference && reference < attitude_reference + 4;
+    return !(state & BEFORE_START) || !ended;
 }
 
-static void read_all(Slot *slot, unsigned state, int status, double values[]) {
+static void read_all(Slot *slot, unsigned state, bool ended, double values[]) {
     for (unsigned i = 0; i < VARIABLE_COUNT; i++) {
         values[i] = 0.0;
 #if DOCK_COUNT
@@ -25,7 +21,7 @@ static void read_all(Slot *slot, unsigned state, int status, double values[]) {
             continue;
         }
 #endif
-        if (comparable(slot, state, status, i) && get_values(slot, &i, 1, &values[i], 1) != OK) values[i] = -12345.0;
+        if (comparable(state, ended, i) && get_values(slot, &i, 1, &values[i], 1) != OK) values[i] = -12345.0;
     }
 }
 
@@ -33,11 +29,12 @@ static void read_all(Slot *slot, unsigned state, int status, double values[]) {
 static void check_unchanged(Slot *slot, const Known *known, int status) {
     double after[VARIABLE_COUNT], before[VARIABLE_COUNT];
     const char *name = called;
+    const bool ended = slot->now.state == TERMINATED;
     if (FMI == 2 && known->state == INSTANTIATED) return;
-    read_all(slot, known->state, status, after);
+    read_all(slot, known->state, ended, after);
     if (restore(slot, slot->before) != OK) fail("the state before a call cannot be restored", slot, ERROR);
     slot->now = *known;
-    read_all(slot, known->state, status, before);
+    read_all(slot, known->state, ended, before);
     called = name;
     for (unsigned i = 0; i < VARIABLE_COUNT; i++) {
         if (memcmp(&after[i], &before[i], sizeof after[i]) == 0) continue;
@@ -52,6 +49,18 @@ static void check_ended(Slot *slot) {
     const char *name = called;
     if (set_values(slot, &reference, 1, &value, 1) != ERROR) fail("an instance goes on after an error", slot, ERROR);
     called = name;
+}
+
+/* Whether an error was a broken rule. FMI 2.0 has no Discard for most calls that values keep from their answer: there
+   an error that the arguments did not ask for may leave the instance as it was. */
+static bool is_ended(Slot *slot, Answer answer) {
+    if (FMI == 3 || answer.expected == AN_ERROR) return true;
+    const char *name = called;
+    const unsigned lines = slot->lines;
+    const bool ended = set_values(slot, NULL, 0, NULL, 0) == ERROR;
+    slot->lines = lines;
+    called = name;
+    return ended;
 }
 
 static void check_running(Slot *slot) {
@@ -92,8 +101,10 @@ static void check(Slot *slot, Answer answer, const Known *known, unsigned log_ma
     note(&answer.status, sizeof answer.status);
     if (answer.status == ERROR) {
         slot->now = *known;
-        slot->now.state = TERMINATED;
-        check_ended(slot);
+        if (is_ended(slot, answer)) {
+            slot->now.state = TERMINATED;
+            check_ended(slot);
+        }
     }
     if (refused && !slot->inner_error && once_in(2)) check_unchanged(slot, known, answer.status);
     if ((slot->now.state & RUNNING) && once_in(4)) check_running(slot);

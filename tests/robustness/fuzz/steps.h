@@ -39,6 +39,7 @@ static Answer step(Slot *slot) {
 #else
     called = "fmi2DoStep";
     if (slot->now.state != STEPPING) answer.expected = AN_ERROR;
+    if (answer.expected == NO_ERROR) answer.expected = ANYTHING; /* to values that cannot be used */
     answer.status = (int)fmi2DoStep(slot->component, time, size, once_in(2));
     if (answer.status == OK) slot->now.time = time + size;
 #endif
@@ -82,8 +83,8 @@ static bool differentiable(const Slot *slot, unsigned reference, bool unknown) {
     if (reference >= VARIABLE_COUNT || is_boolean(reference)) return false;
     switch (VARIABLES[reference].role) {
         case ROLE_TIME:
-        case ROLE_INPUT: return !unknown;
-        case ROLE_PARAMETER: return !unknown && before;
+        case ROLE_INPUT:
+        case ROLE_PARAMETER: return !unknown;
         case ROLE_STATE: return unknown == before;
         default: return unknown;
     }

@@ -29,7 +29,8 @@ static bool settable(const Slot *slot, unsigned reference) {
     switch (VARIABLES[reference].role) {
         case ROLE_INPUT: return true;
         case ROLE_PARAMETER: return (slot->now.state & BEFORE_START) != 0;
-        case ROLE_STATE: return slot->exchange && (slot->now.state & EXCHANGING) != 0;
+        case ROLE_STATE:
+            return slot->now.state == INSTANTIATED || (slot->exchange && (slot->now.state & EXCHANGING) != 0);
         default: return false;
     }
 }
