@@ -115,6 +115,11 @@ CASES = pytest.mark.parametrize(
 )
 
 
+def status_of(place: str, judge: Callable[[Instance], int], fmi: int) -> int:
+    """Returns the status of a refused value; FMI 2.0 has Discard where an importer's solver reads."""
+    return DISCARD if place.startswith("me") and judge in (read, rates) else refusal(fmi)
+
+
 def held(instance: Instance) -> list[float]:
     """Returns what an instance holds that no input sets."""
     return [*instance.get("attitude"), *instance.get("angular_velocity"), instance.get("time")]
@@ -142,10 +147,7 @@ def test_what_cannot_be_is_discarded_by_name_and_the_same_call_works_after(place
         ):
             continue
         instance = brought(place, fmi, YARD)
-        discards = place.startswith("me") and judge in (read, rates)
-        refused(
-            instance, judge, wrong, words if not moving else words[:3], DISCARD if discards else refusal(fmi)
-        )
+        refused(instance, judge, wrong, words if not moving else words[:3], status_of(place, judge, fmi))
         instance.free()
 
 
@@ -189,7 +191,8 @@ def test_a_docking_that_leaves_no_finite_rate_names_the_dock(place, judge, fmi):
     if "initialising" in place or "continuous" in place:
         return  # docks are closed at the start, and stay as they are in continuous time
     instance = brought(place, fmi, YARD)
-    refused(instance, judge, AT_CONTACT, "stowed.docked = true with this motion leaves angular_velocity = (")
+    words = "stowed.docked = true with this motion leaves angular_velocity = ("
+    refused(instance, judge, AT_CONTACT, words, status_of(place, judge, fmi))
     instance.free()
 
 
