@@ -83,7 +83,7 @@ bench: .venv/installed-dev
 # What the FMI project asks of tools that export FMUs.
 compatibility: .venv/installed
 	rm -rf build/compatibility
-	$(BIN)/python -m fmu_build.compatibility examples/iss_dg.toml examples/berth.toml examples/launch_stack.toml \
+	$(BIN)/python -m fmu_build.compatibility examples/berth.toml examples/tanker.toml examples/launch_stack.toml \
 	  --platform all -o build/compatibility
 
 slews: .venv/installed-dev

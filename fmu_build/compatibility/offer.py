@@ -15,6 +15,7 @@ from xml.etree import ElementTree as ET
 
 import fmpy
 import numpy as np
+from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 from numpy.typing import NDArray
 
@@ -164,7 +165,10 @@ def _checked(
     if platform != host_platform():
         return f"{tool}; not flown on this platform"
     kind, reference = what
-    difference = _difference(fmu, flight, entries, kind, reference)
+    try:
+        difference = _difference(fmu, flight, entries, kind, reference)
+    except FMICallException as error:
+        raise BuildError(f"{fmu.name}: {INTERFACES[kind]}: FMPy's flight ends: {error}") from None
     if not difference <= ALLOWED[kind]:
         raise BuildError(
             f"{fmu.name}: {INTERFACES[kind]}: FMPy's flight is {difference:.2g} of a variable's largest value"
