@@ -42,7 +42,9 @@ ROLE_TITLES: dict[Role, tuple[str, str]] = {
     "time": ("Independent variable", ""),
     "input": (
         "Inputs",
-        "In co-simulation they hold over a communication step; in model exchange they are continuous.",
+        "In co-simulation they hold over a communication step. In model exchange they are continuous, but "
+        "for docks, the motion at contact, and what is called discrete where the page says what changes "
+        "keep: these change in event mode alone.",
     ),
     "parameter": ("Parameters", "Fixed once initialisation ends."),
     "output": (

@@ -1,6 +1,6 @@
 """What the page says of the rotation: equations of the laws, energy and momentum, what changes keep; HTML."""
 
-from supervessel.scene.schema import Law, Scene
+from supervessel.scene.schema import Law, Scene, discrete_changes
 
 PRIME, MINUS, TIMES = "\N{PRIME}", "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}"
 
@@ -47,6 +47,14 @@ KEPT_BY = {
 }
 """What changes keep, HTML."""
 
+DISCRETE = {
+    "mass": "In model exchange masses and moments are discrete here: they change in event mode alone, where "
+    "the angular velocity jumps with them.",
+    "pose": "In model exchange poses, and motions of ports, are discrete here: they change in event mode "
+    "alone, where the angular velocity jumps with them.",
+}
+"""What is said of a kind of change that is one of `schema.discrete_changes`, HTML."""
+
 DOCKING = (
     "Docks open and close between the steps of co-simulation, or in event mode. What undocks leaves with its "
     "share of the momentum: the angular velocity of the rest is kept. What docks brings its own along: the "
@@ -92,6 +100,7 @@ def what_changes_keep(scene: Scene) -> str:
     texts = [KEPT_BY[kind, kept] for kind, kept in scene.keeps.items()]
     if len(texts) == 2:
         texts.append("Where both change at one instant, masses come first.")
+    texts += [DISCRETE[kind] for kind in scene.keeps if kind in discrete_changes(scene)]
     if scene.inputs.docked:
         texts.append(DOCKING)
     return "\n".join(f"<p>{text}</p>" for text in texts) or "<p>No input of this scene changes them.</p>"

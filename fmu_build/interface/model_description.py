@@ -256,7 +256,7 @@ def _identity(entry: TableEntry) -> dict[str, str]:
 
 def _role(entry: TableEntry) -> dict[str, str]:
     """Returns causality, variability and initial of a variable."""
-    return ROLES[entry.role] | ({"variability": "discrete"} if entry.variable.boolean else {})
+    return ROLES[entry.role] | ({"variability": "discrete"} if entry.variable.discrete else {})
 
 
 def _type_attributes(entry: TableEntry) -> dict[str, str]:
@@ -271,6 +271,8 @@ def _type_attributes(entry: TableEntry) -> dict[str, str]:
     numbers = {"min": variable.low, "max": variable.high, "start": variable.start}
     if entry.nominal != 1.0:
         numbers["nominal"] = entry.nominal
+    if variable.jumps:
+        attributes["reinit"] = "true"
     return attributes | {name: repr(number) for name, number in numbers.items() if number is not None}
 
 

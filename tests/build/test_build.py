@@ -20,7 +20,7 @@ from fmu_build.generate.model import generate
 from fmu_build.generate.sources import source_file_names, source_files
 from fmu_build.platforms import PLATFORMS, host_platform
 from supervessel import load_scene
-from support import BALL, ISS_DG, PARAMETERS, STATES, body, built, scene, variant
+from support import BALL, ISS_DG, PARAMETERS, STATES, STEADY, body, built, scene, variant
 from support.marks import FMI
 
 LAYER = Path(fmu_build.__file__).parent / "c"
@@ -234,6 +234,14 @@ COMPILERS = {"gcc": ["gcc", "-O2"], "zig": [sys.executable, "-m", "ziglang", "cc
 """Warnings of gcc follow the flow of values, as it does when it optimises; those of zig's clang do not."""
 
 
+DOCKS = variant(
+    ISS_DG,
+    {
+        "docks": [{"ports": ["ISS.P2", "DG.nose"], "name": "berth", "docked": False}],
+        "inputs.docked": ["berth"],
+    },
+)
+
 SHAPES = {
     "every step, free motion": variant(ISS_DG, {"rotation.propagator": "auto"}),
     "steps by error": variant(ISS_DG, {"rotation.propagator": "dop853"}),
@@ -243,14 +251,12 @@ SHAPES = {
     "momentum for a state": variant(
         ISS_DG, {"rotation": {"mass_change": "momentum", "pose_change": "momentum"}}
     ),
-    "one kind of change keeps momentum": variant(ISS_DG, {"rotation.mass_change": "momentum"}),
-    "docks": variant(
-        ISS_DG,
-        {
-            "docks": [{"ports": ["ISS.P2", "DG.nose"], "name": "berth", "docked": False}],
-            "inputs.docked": ["berth"],
-        },
+    "one kind of change keeps momentum": variant(
+        ISS_DG, {"rotation": {"mass_change": "momentum", "pose_change": "rate"}}
     ),
+    "docks": DOCKS,
+    "docks, the rate kept": variant(DOCKS, {"rotation": STEADY}),
+    "docks, momentum for a state": variant(DOCKS, {"rotation": {"mass_change": "momentum"}}),
 }
 """What the C layer compiles differently."""
 

@@ -34,13 +34,13 @@ def every_kind() -> dict:
     tensor = [[1500.0, 100.0, 20.0], [100.0, 1600.0, -50.0], [20.0, -50.0, 1700.0]]
     raw["vessels"]["v9"] |= {"inertia": tensor, "centre_of_mass": [0.5, 0.0, -0.1]}
     del raw["vessels"]["v9"]["pmi"]
-    return raw
+    return variant(raw, {"rotation.pose_change": "rate"})
 
 
 def everything() -> dict:
     raw = station(COUNT, [f"v{i}" for i in range(COUNT)])
     raw["inputs"]["pose"] = [port for dock in raw["docks"] for port in dock["ports"]]
-    return raw
+    return variant(raw, {"rotation.pose_change": "rate"})
 
 
 SCENES = {

@@ -22,7 +22,7 @@ from fmu_build.generate.picked_files import STEPS as OF_STEPS
 from fmu_build.generate.sources import LAYER, layer_files, source_file_names, source_files
 from fmu_build.storage.cache import cache_folder
 from supervessel.rotation.propagators import PROPAGATORS
-from support import ISS_DG, OK, Instance, body, built, scene, variant
+from support import ISS_DG, OK, STEADY, Instance, body, built, scene, variant
 from support.costs import station
 from support.marks import FMI
 
@@ -153,7 +153,7 @@ SCENES = {
     "exact": body(propagator="exact") | {"inputs": {"torque": False}},
     **{name: body(propagator=name) for name in PROPAGATORS if name != "exact"},
     "auto": variant(ISS_DG, {"rotation.propagator": "auto"}),
-    "momentum kept by masses": variant(ISS_DG, {"rotation.mass_change": "momentum"}),
+    "momentum kept by masses": variant(ISS_DG, {"rotation": {"mass_change": "momentum"} | STEADY}),
     "momentum kept": variant(ISS_DG, {"rotation": {"mass_change": "momentum", "pose_change": "momentum"}}),
     "docks": variant(
         ISS_DG,

@@ -5,10 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
+from lxml import etree
 from scipy.integrate import solve_ivp
 
 from changes.histories import ByEvents, ByExchange, ByFmu, Values, elements, start_values
 from changes.scenes import DURATION, MIXED, STEADY, TORQUE, TUG, TUG_EVENTS, drawn_in
+from fmu_build.generate.model import generate
 from supervessel import reference
 from support import EPS, ERROR, OK, Instance, refusal, scene, variant
 from support.marks import FMI
@@ -50,6 +52,42 @@ def test_momentum_is_a_state_where_every_change_keeps_it(fmi):
     assert names[4:] == [f"state.angular_momentum[{i}]" for i in (1, 2, 3)]
     names = [v.name for v in Instance(MIXED, fmi).description.modelVariables if v.name.startswith("state.")]
     assert names[4:] == [f"state.angular_velocity[{i}]" for i in (1, 2, 3)]
+
+
+DOCKS = {"held.docked", "stowed.docked"}
+CONTACT = {f"{dock}.{what}" for dock in ("held", "stowed") for what in ("velocity", "rate")}
+POSES = {f"tug.arm.{what}" for what in ("position", "direction", "alignment")}
+MOMENTUM, RATE = "state.angular_momentum", "state.angular_velocity"
+FIXED = {"docks": [{"ports": ["tug.arm", "tank.end"]}], "inputs.docked": []}
+AT_EVENTS: dict[str, tuple[dict[str, Any], set[str], str]] = {
+    "momentum": (TUG, DOCKS | CONTACT, MOMENTUM),
+    "mixed": (MIXED, DOCKS | CONTACT | POSES, RATE),
+    "rate": (STEADY, DOCKS | CONTACT, RATE),
+    "no law": (variant(STEADY, {"rotation.law": "none"}), DOCKS | CONTACT, ""),
+    "momentum, no docks": (variant(TUG, FIXED), set(), ""),
+    "mixed, no docks": (variant(MIXED, FIXED), POSES, RATE),
+    "mixed the other way, no docks": (
+        variant(TUG, FIXED | {"rotation.pose_change": "rate"}),
+        {"tank.mass"},
+        RATE,
+    ),
+    "rate, no docks": (variant(STEADY, FIXED), set(), ""),
+    "poses, no docks": (variant(MIXED, FIXED | {"inputs.mass": []}), set(), ""),
+}
+"""Scenes, their discrete inputs, and the state that an event can change."""
+
+
+@FMI
+@pytest.mark.parametrize("kind", AT_EVENTS)
+def test_the_description_says_what_changes_at_events_alone_and_which_states_do(kind, fmi):
+    raw, discrete, state = AT_EVENTS[kind]
+    found = etree.fromstring(generate(scene(raw), fmi)[1]).find("ModelVariables")
+    attributes = [dict(e.attrib) if fmi == 3 else {**e.attrib, **e[0].attrib} for e in found]
+    groups = {v["name"].partition("[")[0] for v in attributes if v["variability"] == "discrete"}
+    assert groups == discrete
+    assert [v["name"] for v in attributes if v.get("reinit") == "true"] == [
+        f"{state}[{i}]" for i in (1, 2, 3) if state
+    ]
 
 
 # A dozen points, ten roundings each, and the condition of a tensor with moments 20 times apart.

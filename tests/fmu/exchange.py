@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from fmpy.fmi2 import fmi2EventInfo
 
-from support import ERROR, ISS_DG, OK, TURNING, Instance, variant
+from support import ERROR, ISS_DG, OK, STEADY, TURNING, Instance, variant
 
 RATES, ATTITUDE = TURNING["angular_velocity"], TURNING["attitude"]
-RAW = variant(ISS_DG, {"name": "exchanged", "rotation": TURNING})
+RAW = variant(ISS_DG, {"name": "exchanged", "rotation": TURNING | STEADY})
 
 
 def start(raw: dict[str, Any] = RAW, fmi: int = 3, mode: str = "continuous") -> Instance:
@@ -28,6 +28,13 @@ def start(raw: dict[str, Any] = RAW, fmi: int = 3, mode: str = "continuous") -> 
         assert instance.set({"mass": 1.0}) == ERROR
     instance.log.clear()
     return instance
+
+
+def change(instance: Instance, values: dict[str, Any]) -> list[int]:
+    """Changes inputs, of which some may be discrete, in model exchange by an event; returns the statuses."""
+    if hasattr(instance.fmu, "doStep"):
+        return [instance.set(values)]
+    return [instance._status(instance.fmu.enterEventMode), instance.set(values), instance.run()]
 
 
 def scalars(values: dict[str, Any]) -> dict[str, float]:

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from supervessel import Twin
-from support import EPS, ISS_DG, OK, TURNING, Instance, body, scene, variant
+from support import EPS, ISS_DG, OK, STEADY, TURNING, Instance, body, scene, variant
 
 SEED = 20240609
 
-RAW = variant(ISS_DG, {"name": "derived", "rotation": TURNING})
+RAW = variant(ISS_DG, {"name": "derived", "rotation": TURNING | STEADY})
 CHAIN: dict[str, Any] = {
     "name": "chain",
     "root": "A",
@@ -47,7 +47,7 @@ CHAIN: dict[str, Any] = {
     },
     "docks": [{"ports": ["A.one", "B.aft"]}, {"ports": ["C.aft", "B.fore"]}, {"ports": ["A.two", "D.aft"]}],
     "inputs": {"mass": ["A", "C", "D"], "pmi": ["B"], "pose": ["A.one", "B.fore", "C.aft"], "torque": True},
-    "rotation": TURNING,
+    "rotation": TURNING | STEADY,
     "outputs": ISS_DG["outputs"],
 }
 SCENES: dict[str, dict[str, Any]] = {

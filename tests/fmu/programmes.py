@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from fmu.exchange import change
 from supervessel import reference
 from support import ISS_DG, OK, Instance, draw_inputs, scene, variant
 
@@ -61,7 +62,8 @@ def exchange(instance: Instance, seed: int, moves: int = 25) -> Iterator[list[fl
             "state.attitude": generator.normal(size=4),
             "state.angular_velocity": generator.normal(size=3) * 0.1,
         }
-        assert instance.set(draw_inputs(generator) | states) == OK
+        assert change(instance, draw_inputs(generator)) == [OK] * 3
+        assert instance.set(states) == OK
         assert instance._status(instance.fmu.setTime, generator.uniform(0.0, 10.0)) == OK
         yield [*outputs(instance), instance.get("time")]
 

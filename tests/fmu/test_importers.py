@@ -10,7 +10,7 @@ import pytest
 from fmpy import extract
 
 from supervessel import Twin
-from support import ISS_DG, TURNING, U, body, built, relative_error, scene, variant
+from support import ISS_DG, STEADY, TURNING, U, body, built, relative_error, scene, variant
 from support.marks import FMI
 from support.pages import text
 
@@ -27,15 +27,17 @@ DIFFERENCE = 1e-5
 
 PORT = {"direction": [-1.0, 0, 0], "alignment": [0, 1.0, 0]}
 SCENES: dict[str, dict[str, Any]] = {
-    "ISS": ISS_DG,
-    "principal": variant(ISS_DG, {"name": "imported", "rotation": TURNING, "rotation.law": "principal"}),
+    "ISS": variant(ISS_DG, {"rotation": STEADY}),
+    "principal": variant(
+        ISS_DG, {"name": "imported", "rotation": TURNING | STEADY, "rotation.law": "principal"}
+    ),
     "mass and torque": {
         **variant(ISS_DG, {"name": "light"}),
         "inputs": {"mass": ["ISS", "DG"], "torque": True},
         "rotation": TURNING,
     },
     "pose of both ports": variant(
-        ISS_DG, {"name": "posed", "inputs": {"pose": ["ISS.P2", "DG.nose"]}, "rotation": TURNING}
+        ISS_DG, {"name": "posed", "inputs": {"pose": ["ISS.P2", "DG.nose"]}, "rotation": TURNING | STEADY}
     ),
     "one body": {**body(**TURNING), "name": "one"},
     "no inputs": {**body(**TURNING), "name": "none", "inputs": {}},

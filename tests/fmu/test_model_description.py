@@ -329,9 +329,13 @@ def test_outputs_rates_and_time_have_no_start_value(raw, fmi):
 @FMI
 @SCENE
 def test_causality_variability_and_initial_follow_from_the_role(raw, fmi):
+    inputs = raw.get("inputs", {})
+    # Beside masses and moments, which keep the rate, poses, which keep the momentum, change at events alone.
+    ports = tuple(f"{port}." for port in inputs.get("pose", []) if inputs.get("mass") or inputs.get("pmi"))
+    variability = {n: "discrete" if n.startswith(ports) else "continuous" for n in input_names(raw)}
     roles = {
         **dict.fromkeys(["time"], ("independent", "continuous", None)),
-        **dict.fromkeys(input_names(raw), ("input", "continuous", None)),
+        **{name: ("input", kind, None) for name, kind in variability.items()},
         **dict.fromkeys(PARAMETERS, ("parameter", "fixed", "exact")),
         **dict.fromkeys(output_names(raw), ("output", "continuous", "calculated")),
         **dict.fromkeys(STATES, ("local", "continuous", "approx")),

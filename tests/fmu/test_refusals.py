@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from fmu.refusals import SINGLE, last_successful_time, outputs
-from support import DISCARD, EPS, ERROR, INF, ISS_DG, NAN, OK, Instance, flying, refusal, variant
+from support import DISCARD, EPS, ERROR, INF, ISS_DG, NAN, OK, STEADY, Instance, flying, refusal, variant
 from support.marks import FMI
 
 TUMBLING = variant(
     ISS_DG,
     {
         "name": "tumbling",
-        "rotation": {"angular_velocity": [0.02, -0.03, 0.01], "attitude": [1.0, 2.0, 3.0, 4.0]},
+        "rotation": {"angular_velocity": [0.02, -0.03, 0.01], "attitude": [1.0, 2.0, 3.0, 4.0]} | STEADY,
     },
 )
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fmu.exchange import change
 from fmu.saved_states import bytes_of, function, restore, save
 from support import DISCARD, ERROR, ISS_DG, OK, TURNING, Instance, body, draw_inputs, refusal, variant
 from support.marks import FMI, KIND
@@ -91,7 +92,7 @@ def go_on(instance: Instance, exchange: bool, moment: str) -> list[Any]:
     instance.time = instance.get("time")
     for seed in range(SEED, SEED + 3):
         answers.append(instance.bits())
-        answers.append(instance.set(draw(seed)))
+        answers += change(instance, draw(seed))
         advance(instance, seed)
     return [*answers, instance.bits()]
 

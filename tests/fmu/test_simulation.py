@@ -9,7 +9,7 @@ from fmpy import simulate_fmu
 from scipy.integrate import solve_ivp
 
 from supervessel import reference
-from support import COMPOSITE_TOLERANCE, EPS, ISS_DG, LAWS, relative_error, scene, unpacked, variant
+from support import COMPOSITE_TOLERANCE, EPS, ISS_DG, LAWS, STEADY, relative_error, scene, unpacked, variant
 from support.marks import FMI
 
 LAW = pytest.mark.parametrize("law", LAWS)
@@ -45,7 +45,7 @@ ATTITUDE = [0.5, -0.5, 0.7, 0.1]
 
 
 def raw_scene(law: str, **rotation: Any) -> dict[str, Any]:
-    rotation = {"max_angle_step": ANGLE, "angular_velocity": RATES, "attitude": ATTITUDE} | rotation
+    rotation = STEADY | {"max_angle_step": ANGLE, "angular_velocity": RATES, "attitude": ATTITUDE} | rotation
     return variant(ISS_DG, {"name": f"flight_{law}", "rotation": {"law": law, **rotation}})
 
 

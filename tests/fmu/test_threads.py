@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fmu.exchange import change
 from support import DISCARD, ISS_DG, OK, Instance, refusal, variant
 from support.marks import FMI, KIND
 
@@ -37,7 +38,7 @@ def life(instance: Instance, exchange: bool, seed: int) -> list[bytes]:
         assert instance.run() == OK
     rows = []
     for _ in range(STEPS):
-        assert instance.set(draw(generator)) == OK
+        assert set(change(instance, draw(generator))) == {OK}
         state = instance.fmu.getFMUState()
         if exchange:
             instance.set({"state.angular_velocity": generator.normal(size=3)})

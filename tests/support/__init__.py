@@ -26,7 +26,18 @@ from support.numbers import (
     random_rotation,
     relative_error,
 )
-from support.scenes import BALL, ISS_DG, LAWS, PROPAGATORS, TURNING, body, draw_inputs, scene, variant
+from support.scenes import (
+    BALL,
+    ISS_DG,
+    LAWS,
+    PROPAGATORS,
+    STEADY,
+    TURNING,
+    body,
+    draw_inputs,
+    scene,
+    variant,
+)
 
 __all__ = [
     "BALL",
@@ -42,6 +53,7 @@ __all__ = [
     "PARAMETERS",
     "PROPAGATORS",
     "STATES",
+    "STEADY",
     "TURNING",
     "UNIT_TOLERANCE",
     "WARNING",

@@ -15,6 +15,10 @@ PROPAGATORS = ("rk4", "dop853", "taylor", "exact", "split", "auto")
 TURNING = {"angular_velocity": [0.05, -0.08, 0.11], "attitude": [0.5, -0.5, 0.7, 0.1]}
 """A start about no axis in particular, of a table [rotation]."""
 
+STEADY = {"pose_change": "rate"}
+"""Of a table [rotation]: poses keep the angular velocity, as masses do, and are continuous in model exchange;
+for tests that are not about what changes keep."""
+
 ISS_DG: dict[str, Any] = {
     "name": "iss_dg",
     "root": "ISS",
@@ -106,7 +110,7 @@ def body(mass: float = 1000.0, pmi: Sequence[float] = (1.0, 2.0, 2.5), **rotatio
 
 def scene(raw: Mapping[str, Any]) -> Scene:
     """Returns the scene of a raw one; where it does not say otherwise propagated by RK4, whose steps can be
-    foretold, and keeping the angular velocity when poses change. The law "none" keeps it anyway.
+    foretold.
 
     A raw scene with [accuracy] has its law and propagator by the test: the scene is as `choose`
     would leave it.
@@ -114,13 +118,8 @@ def scene(raw: Mapping[str, Any]) -> Scene:
     if "accuracy" in raw:
         asked = Accuracy.model_validate(raw["accuracy"])
         return scene(variant(raw, {"accuracy": None})).model_copy(update={"accuracy": asked})
-    given = raw.get("rotation", {})
-    unless = {"rotation.propagator": "rk4"}
-    posed = raw.get("inputs", {}).get("pose") and not raw["inputs"].get("motion")
-    if posed and given.get("law") != "none":
-        unless["rotation.pose_change"] = "rate"
-    changes = {k: given.get(k.removeprefix("rotation."), v) for k, v in unless.items()}
-    return parse_scene(variant(raw, changes))
+    propagator = raw.get("rotation", {}).get("propagator", "rk4")
+    return parse_scene(variant(raw, {"rotation.propagator": propagator}))
 
 
 BALL = """\

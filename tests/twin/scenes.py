@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from supervessel import Twin
-from support import ISS_DG, LAWS, Array
+from support import ISS_DG, LAWS, STEADY, Array
 
 
 def random_pmi(rng: np.random.Generator) -> list[float]:
@@ -51,6 +51,8 @@ def random_scene(seed: int) -> dict[str, Any]:
         docks.append({"ports": rng.permutation([f"{parent}.to{i}", f"{names[i]}.own"]).tolist()})
     ports = [port for dock in docks for port in dock["ports"]]
 
+    law = LAWS[seed // 3 % 4]
+
     def some(of: list[str]) -> list[str]:
         return [name for name in of if rng.random() < 0.4]
 
@@ -66,7 +68,8 @@ def random_scene(seed: int) -> dict[str, Any]:
             "torque": seed % 3 != 2,
         },
         "rotation": {
-            "law": LAWS[seed // 3 % 4],
+            **({} if law == "none" else STEADY),
+            "law": law,
             "angular_velocity": (0.1 * rng.normal(size=3)).tolist(),
             "attitude": rng.normal(size=4).tolist(),
         },

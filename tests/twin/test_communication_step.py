@@ -16,7 +16,7 @@ from fmu_build.generate.model import generate
 from fmu_build.generate.sources import LAYER
 from supervessel import Twin
 from supervessel.twin.functions import TwinFunction
-from support import EPS, ISS_DG, OK, Array, Instance, body, scene, variant
+from support import EPS, ISS_DG, OK, STEADY, Array, Instance, body, scene, variant
 from twin.scenes import numbers, random_inputs, random_scene
 
 STARTS = 12  # of flights of each scene
@@ -33,7 +33,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def random_assembly(seed: int, propagator: str) -> dict[str, Any]:
     """Returns a random scene that any propagator takes: by the full tensor, with a torque."""
     raw = random_scene(seed)
-    changes = {"law": "tensor", "propagator": propagator, "tolerance": 10.0 ** -(6 + seed)}
+    changes = STEADY | {"law": "tensor", "propagator": propagator, "tolerance": 10.0 ** -(6 + seed)}
     return variant(raw, {"inputs.torque": True, **{f"rotation.{key}": v for key, v in changes.items()}})
 
 
@@ -43,7 +43,7 @@ SCENES = {
         for seed, name in enumerate(("rk4", "dop853", "taylor", "exact", "split", "auto"))
     },
     "momentum": variant(
-        ISS_DG, {"name": "keeping", "rotation": {"propagator": "auto", "mass_change": "momentum"}}
+        ISS_DG, {"name": "keeping", "rotation": STEADY | {"propagator": "auto", "mass_change": "momentum"}}
     ),
     "no p": body(propagator="dop853"),
     "docks": variant(MIR, {"inputs.torque": True}),

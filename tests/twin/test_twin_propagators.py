@@ -9,7 +9,20 @@ import pytest
 
 from supervessel import Twin
 from supervessel.rotation.propagators.free_motion import FIRST_ANGLE, LARGEST_TURN
-from support import ISS_DG, OK, PROPAGATORS, Array, U, body, flying, random_rotation, scene, series, variant
+from support import (
+    ISS_DG,
+    OK,
+    PROPAGATORS,
+    STEADY,
+    Array,
+    U,
+    body,
+    flying,
+    random_rotation,
+    scene,
+    series,
+    variant,
+)
 from twin.scenes import numbers
 
 RATES = [0.05, -0.08, 0.11]
@@ -18,7 +31,7 @@ TORQUE, WEAK_TORQUE = [2e5, -1e5, 3e5], [2e-3, -1e-3, 3e-3]
 
 
 def assembly(propagator: str, law: str = "tensor") -> dict[str, Any]:
-    rotation = {
+    rotation = STEADY | {
         "law": law,
         "propagator": propagator,
         "angular_velocity": RATES,

@@ -40,13 +40,16 @@ class InputKind:
                   scalar
     unit        : as FMI writes it, "" for a pure number
     part        : its use
-    change      : what changes with it
+    change      : what changes with it; by it `schema.discrete_changes` tells the kinds that change at events
+                  only because of what the scene's other changes keep
     description : text of a variable with places for {owner}, {vessel}, {axis} and, of a dock, for its ports
                   {first}, {second} and the first one's vessel {first_vessel}
     start       : scene, owner -> the scene's value, element by element
     lowest      : least possible value, None where all values are possible
     noun        : its name in an error text, "a mass"
     boolean     : whether it is true or false, 1 or 0 as a number
+    discrete    : whether it changes at events only, in every scene: a dock opens and closes at an instant,
+                  when the motion at contact is read
     directed    : whether it is a vector of which only the direction matters; it must then not be zero
     judge       : the check by which the FMU judges it; of an owner's vectors only the first one names it
     given_by    : key that the owner's table must have, "" for none
@@ -65,6 +68,7 @@ class InputKind:
     lowest: float | None = None
     noun: str = "an input"
     boolean: bool = False
+    discrete: bool = False
     directed: bool = False
     judge: Judge = ""
     given_by: str = ""
@@ -223,6 +227,7 @@ DOCKED = InputKind(
     "whether {first} and {second} are docked",
     _docked,
     boolean=True,
+    discrete=True,
 )
 CONTACT_VELOCITY = InputKind(
     "docked",
@@ -234,6 +239,7 @@ CONTACT_VELOCITY = InputKind(
     "",
     "velocity at contact, of {second} relative to {first}, {axis} in the axes of {first_vessel}",
     _zero,
+    discrete=True,
 )
 CONTACT_RATE = InputKind(
     "docked",
@@ -245,6 +251,7 @@ CONTACT_RATE = InputKind(
     "",
     "angular velocity at contact, of {second} relative to {first}, {axis} in the axes of {first_vessel}",
     _zero,
+    discrete=True,
 )
 TORQUE = InputKind(
     "torque",

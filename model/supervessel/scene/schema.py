@@ -350,6 +350,24 @@ def changes_rate(scene: Scene) -> bool:
     return changing and scene.rotation.law != "none"
 
 
+def discrete_changes(scene: Scene) -> frozenset[str]:
+    """Returns the kinds of change that inputs make at events only, because of what other changes keep.
+
+    Where some changes keep the angular velocity and others the momentum, the state of model exchange is the
+    angular velocity. What keeps the momentum would change it all the time, by a rate that follows from the
+    inputs' own rates, and these are not told.
+    """
+    if keeps_momentum(scene) or not changes_rate(scene):
+        return frozenset()
+    return frozenset(change for change, kept in scene.keeps.items() if kept == "momentum")
+
+
+def jumps(scene: Scene) -> bool:
+    """Whether an event can change the states of model exchange: the angular velocity or momentum."""
+    jumping = bool(scene.inputs.docked) or not keeps_momentum(scene)
+    return changes_rate(scene) and jumping
+
+
 TABLES: dict[tuple[str, ...], type[Table]] = {
     (): Scene,
     ("vessels", "*"): Vessel,

@@ -11,7 +11,7 @@ from supervessel.scene.outputs import (
     OutputKind,
     output_kind,
 )
-from supervessel.scene.schema import Scene, keeps_momentum
+from supervessel.scene.schema import Scene, discrete_changes, jumps, keeps_momentum
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,8 @@ class Variable:
     group     : the name without its index
     element   : place in its group, from 0
     boolean   : whether it is true or false; its numbers are then 1 and 0
+    discrete  : whether it is an input that changes at events only
+    jumps     : whether it is a state that an event can change
     """
 
     name: str
@@ -36,6 +38,8 @@ class Variable:
     group: str = ""
     element: int = 0
     boolean: bool = False
+    discrete: bool = False
+    jumps: bool = False
 
 
 @dataclass(frozen=True)
@@ -90,7 +94,7 @@ RATE_UNITS = {"": "1/s", "rad/s": "rad/s2", "N.m.s": "N.m"}
 
 def input_variables(scene: Scene) -> tuple[InputVariable, ...]:
     """Returns the inputs in the order of the model description: shape, contact, action."""
-    ranges = scene.inputs.range
+    ranges, at_events = scene.inputs.range, discrete_changes(scene)
     variables = []
     for kind, owner in listed(dict(scene.inputs)):
         group, start = kind.group(owner), kind.start(scene, owner)
@@ -109,6 +113,7 @@ def input_variables(scene: Scene) -> tuple[InputVariable, ...]:
                     group=group,
                     element=i,
                     boolean=kind.boolean,
+                    discrete=kind.discrete or kind.change in at_events,
                     kind=kind,
                     owner=owner,
                 )
@@ -179,6 +184,7 @@ def state_variables(scene: Scene) -> tuple[StateVariable, ...]:
             f"state: {description}, {label}; it starts from the start parameters",
             group=f"state.{kind.name}",
             element=i,
+            jumps=kind is kept and jumps(scene),
             kind=kind,
         )
         for kind, description, labels in ((attitude, attitude.description, QUATERNION), (kept, words, AXES))
