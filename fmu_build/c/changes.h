@@ -2,7 +2,8 @@
 
    The FMU has changes.c where a change of inputs can change the rate, else no_changes.c. With changes.c goes the file
    of what the state of model exchange is (momentum_state.c, rate_state.c), and that of what masses and poses keep
-   (kept_momentum.c, kept_rate.c). */
+   (kept_momentum.c, kept_rate.c). Where states follow from inputs otherwise than by keeping the momentum alone there are
+   the derivatives of that too: change_derivatives.c, kept_derivatives.c. */
 #ifndef CHANGES_H
 #define CHANGES_H
 
@@ -40,8 +41,9 @@ bool changes_moved(const Instance *instance);
    follow from the states in model exchange, and the states from x in co-simulation and before the start. */
 void changes_mirror(Instance *instance);
 
-/* Adds to v->x the change of the angular velocity by small changes of the inputs, as the last change of inputs kept
-   rate or momentum. Reverse: adds to the weights on the inputs those that follow from the weights on v->x. */
+/* Adds to v->x what small changes of the inputs do to the state by themselves where it follows from them: in event mode,
+   and in co-simulation between steps. v->c is the change of the composite. Reverse: adds to the weights on the inputs
+   those that follow from the weights on v->x. */
 Status changes_forward(Instance *instance, Variation *v);
 Status changes_reverse(Instance *instance, Variation *v);
 

@@ -68,7 +68,8 @@ static bool derives_ordinary(Instance *instance, const double seed[], size_t cou
     const bool long_enough = fmax(fmax(fabs(s[0]), fabs(s[1])), fmax(fabs(s[2]), fabs(s[3]))) >= 0x1p-150;
     const double *p = instance->now.p, *set = &instance->now.values[REFERENCE_P];
     const bool scaled = memcmp(p, set, INPUT_P_COUNT * sizeof(double)) != 0;
-    return instance_is_ordinary(instance) && are_within(seed, count, ORDINARY) && !scaled &&
+    const bool changed = CHANGES && memcmp(p, instance->now.stepped_p, INPUT_P_COUNT * sizeof(double)) != 0;
+    return instance_is_ordinary(instance) && are_within(seed, count, ORDINARY) && !scaled && !changed &&
            (!at_start || (are_within(s, 4, ORDINARY) && long_enough));
 }
 
@@ -132,7 +133,7 @@ static Status forward(Instance *instance, const unsigned unknowns[], size_t unkn
     for (size_t i = 0; i < known_count; i++) {
         double *change = place_of_known(instance, v, knowns[i]);
         if (change) *change += seed[i];
-        shape_changes = shape_changes || (knowns[i] < REFERENCE_CONTACT && seed[i] != 0.0);
+        shape_changes = shape_changes || (knowns[i] < REFERENCE_TORQUE && seed[i] != 0.0);
     }
     const bool at_start = instance->now.state & BEFORE_START;
     if (at_start) project_attitude_start(instance, v->x);

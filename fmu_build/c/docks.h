@@ -29,6 +29,12 @@ Status docks_check(Instance *instance, const double p[]);
 /* Adds to the rate what the docks that close bring along; c is the composite with them closed. */
 void docks_join(Instance *instance, const double p[], const double c[], double rate[3]);
 
+/* Carries a small change of the rate [rad/s] from before docks close to after it; v has those of the inputs and the
+   composite. Reverse: carries weights on the rate back, and adds to those on the composite and on the inputs. */
+void docks_join_forward(Instance *instance, const Variation *v, const double rate[3], double change[3]);
+void docks_join_reverse(Instance *instance, const double rate[3], double weight[3], double on_composite[],
+                        Variation *v);
+
 /* The name of the input of the first dock that closes, or NULL. */
 const char *docks_first_closing(const Instance *instance, const double p[]);
 
@@ -41,6 +47,15 @@ static inline Status docks_check(Instance *instance, const double p[]) {
 
 static inline void docks_join(Instance *instance, const double p[], const double c[], double rate[3]) {
     (void)instance, (void)p, (void)c, (void)rate;
+}
+
+static inline void docks_join_forward(Instance *instance, const Variation *v, const double rate[3], double change[3]) {
+    (void)instance, (void)v, (void)rate, (void)change;
+}
+
+static inline void docks_join_reverse(Instance *instance, const double rate[3], double weight[3],
+                                      double on_composite[], Variation *v) {
+    (void)instance, (void)rate, (void)weight, (void)on_composite, (void)v;
 }
 
 static inline const char *docks_first_closing(const Instance *instance, const double p[]) {

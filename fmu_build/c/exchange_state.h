@@ -14,4 +14,12 @@ void exchange_take_rate(Instance *instance, const double rate[3]);
 /* Keeps what the next change begins from, once changes.c has kept the rate. */
 void exchange_commit(Instance *instance);
 
+/* Whether a change of inputs, as it is now, changes what the state holds. */
+bool exchange_follows(const Instance *instance);
+
+/* Adds to v->x the small change of the state by one of the rate [rad/s]; v->c is that of the composite. Reverse: gives
+   the weight on the rate, and adds to that on the composite, that follow from the weight on the state. */
+void exchange_forward(Instance *instance, const double change[3], Variation *v);
+void exchange_reverse(Instance *instance, const Variation *v, double weight[3], double on_composite[]);
+
 #endif

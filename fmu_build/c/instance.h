@@ -140,8 +140,7 @@ typedef struct {
 
 /* Small changes of, or weights on, what the model's functions take and give: see derivatives.c. */
 typedef struct {
-    double inputs[INPUT_P_COUNT + INPUT_K_COUNT + INPUT_U_COUNT + 1]; /* + 1: there may be none; motion at contact */
-                                                                      /* changes nothing between events */
+    double inputs[INPUT_P_COUNT + INPUT_K_COUNT + INPUT_U_COUNT + 1]; /* + 1: there may be none */
     double x[STATE_COUNT], c[COMPOSITE_COUNT];
     double rate[STATE_COUNT], y[OUTPUT_COUNT + 1];
 } Variation;

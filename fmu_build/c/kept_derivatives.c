@@ -1,88 +1,75 @@
-/* Derivatives of the angular velocity by the inputs, where some kinds of change keep the momentum and others the rate:
-   in co-simulation the rate follows from the inputs as kept_momentum.c makes it.
+/* Derivatives of the angular velocity by the inputs over the stages of a change that keep the momentum, as kept_momentum.c
+   makes them.
 
-   Needs of the model: derivatives of composite and keep_momentum. */
+   Needs of the model: keep_momentum and its derivatives, derivatives of composite. */
 #include <string.h>
 
 #include "kept_in_changes.h"
 #include "model.h"
 #include "stages.h"
 
-/* Whether the angular velocity follows from inputs: in co-simulation, but not within a step. */
-static bool rate_follows(const Instance *instance) {
-    return !instance->now.model_exchange && !(changes_state(instance) & (BEFORE_START | INTERMEDIATE));
-}
-
-/* The two stages between which momentum was kept last, or would be: before it and after it. */
+/* A stage that keeps the momentum, from before it to after it, and the rate before it. */
 typedef struct {
     Stage before, after;
+    double rate[3];
     unsigned varied_before, varied_after; /* kinds of inputs that are as now */
-} Stages;
+} Keeping;
 
-/* Of kinds that keep the rate, those before the one that keeps momentum belong to both stages. */
-static Status stages_of(Instance *instance, Stages *stages) {
-    changes_begin(instance);
+/* The stage in which inputs of a kind change, from docks that have opened; poses change after masses. */
+static Status stage_of(Instance *instance, unsigned kind, Keeping *stage) {
     const Dynamics *now = &instance->now;
-    stages->varied_before = MASSES_KEEP_MOMENTUM ? 0 : KIND_MASS;
-    stages->varied_after = MASSES_KEEP_MOMENTUM ? KIND_MASS : KIND_MASS | KIND_POSE;
-    first_stage(&stages->before, now->stepped_p, now->kept_c, now->p);
-    move_stage(&stages->before, now->p, stages->varied_before);
-    stages->after = stages->before;
-    move_stage(&stages->after, now->p, stages->varied_after);
-    const Status status = weigh_stage(instance, &stages->before);
-    return status == STATUS_OK ? weigh_stage(instance, &stages->after) : status;
+    Status status = STATUS_OK;
+    memcpy(stage->rate, now->kept_rate, sizeof stage->rate);
+    first_stage(&stage->before, now->stepped_p, now->kept_c, now->p);
+    stage->varied_before = kind == KIND_POSE ? KIND_MASS : 0;
+    stage->varied_after = stage->varied_before | kind;
+    if (kind == KIND_POSE && MASSES_KEEP_MOMENTUM)
+        status = move_keeping_momentum(instance, &stage->before, KIND_MASS, stage->rate);
+    else
+        move_stage(&stage->before, now->p, stage->varied_before);
+    stage->after = stage->before;
+    move_stage(&stage->after, now->p, kind);
+    if (status == STATUS_OK) status = weigh_stage(instance, &stage->before);
+    return status == STATUS_OK ? weigh_stage(instance, &stage->after) : status;
 }
 
-/* Changes of a composite, dc, by those of the inputs of some kinds. */
-static void composite_change(Instance *instance, const double p[], const Variation *v, unsigned kinds, double dc[]) {
-    double dp[INPUT_P_COUNT];
-    for (size_t i = 0; i < INPUT_P_COUNT; i++) dp[i] = INPUT_KINDS[i] & kinds ? v->inputs[i] : 0.0;
-    instance->arg[0] = p;
-    instance->arg[1] = dp;
-    instance->res[0] = dc;
-    composite_forward(instance->arg, instance->res, instance->iw, instance->w, 0);
-}
-
-Status changes_forward(Instance *instance, Variation *v) {
-    if (!rate_follows(instance)) return STATUS_OK;
-    Stages stages;
-    double before[COMPOSITE_COUNT], after[COMPOSITE_COUNT], change[3];
-    static const double none[3] = {0.0, 0.0, 0.0};
-    const Status status = stages_of(instance, &stages);
+static Status stage_forward(Instance *instance, const Variation *v, unsigned kind, double change[3]) {
+    Keeping stage;
+    double before[COMPOSITE_COUNT], after[COMPOSITE_COUNT], next[3];
+    const Status status = stage_of(instance, kind, &stage);
     if (status != STATUS_OK) return status;
-    composite_change(instance, stages.before.p, v, stages.varied_before, before);
-    composite_change(instance, stages.after.p, v, stages.varied_after, after);
-    const double *const arguments[] = {instance->now.kept_rate, stages.before.c, stages.after.c, none, before, after};
+    change_composite(instance, stage.before.p, v, stage.varied_before, before);
+    change_composite(instance, stage.after.p, v, stage.varied_after, after);
+    const double *const arguments[] = {stage.rate, stage.before.c, stage.after.c, change, before, after};
     memcpy(instance->arg, arguments, sizeof arguments);
-    instance->res[0] = change;
+    instance->res[0] = next;
     keep_momentum_forward(instance->arg, instance->res, instance->iw, instance->w, 0);
-    for (size_t i = 0; i < 3; i++) v->x[4 + i] += change[i];
+    memcpy(change, next, sizeof next);
     return STATUS_OK;
 }
 
-/* Adds weights on inputs of some kinds that follow from those on a composite. */
-static void composite_weights(Instance *instance, const double p[], const double wc[], unsigned kinds, Variation *v) {
-    double wp[INPUT_P_COUNT];
-    instance->arg[0] = p;
-    instance->arg[1] = wc;
-    instance->res[0] = wp;
-    composite_reverse(instance->arg, instance->res, instance->iw, instance->w, 0);
-    for (size_t i = 0; i < INPUT_P_COUNT; i++)
-        if (INPUT_KINDS[i] & kinds) v->inputs[i] += wp[i];
-}
-
-Status changes_reverse(Instance *instance, Variation *v) {
-    if (!rate_follows(instance)) return STATUS_OK;
-    Stages stages;
+static Status stage_reverse(Instance *instance, double weight[3], unsigned kind, Variation *v) {
+    Keeping stage;
     double on_rate[3], before[COMPOSITE_COUNT], after[COMPOSITE_COUNT];
-    const Status status = stages_of(instance, &stages);
+    const Status status = stage_of(instance, kind, &stage);
     if (status != STATUS_OK) return status;
-    const double *const arguments[] = {instance->now.kept_rate, stages.before.c, stages.after.c, v->x + 4};
+    const double *const arguments[] = {stage.rate, stage.before.c, stage.after.c, weight};
     double *const results[] = {on_rate, before, after};
     memcpy(instance->arg, arguments, sizeof arguments);
     memcpy(instance->res, results, sizeof results);
     keep_momentum_reverse(instance->arg, instance->res, instance->iw, instance->w, 0);
-    composite_weights(instance, stages.before.p, before, stages.varied_before, v);
-    composite_weights(instance, stages.after.p, after, stages.varied_after, v);
+    weigh_inputs(instance, stage.before.p, before, stage.varied_before, v);
+    weigh_inputs(instance, stage.after.p, after, stage.varied_after, v);
+    memcpy(weight, on_rate, sizeof on_rate);
     return STATUS_OK;
+}
+
+Status rate_on_the_way_forward(Instance *instance, const Variation *v, double change[3]) {
+    const Status status = MASSES_KEEP_MOMENTUM ? stage_forward(instance, v, KIND_MASS, change) : STATUS_OK;
+    return POSES_KEEP_MOMENTUM && status == STATUS_OK ? stage_forward(instance, v, KIND_POSE, change) : status;
+}
+
+Status rate_on_the_way_reverse(Instance *instance, double weight[3], Variation *v) {
+    const Status status = POSES_KEEP_MOMENTUM ? stage_reverse(instance, weight, KIND_POSE, v) : STATUS_OK;
+    return MASSES_KEEP_MOMENTUM && status == STATUS_OK ? stage_reverse(instance, weight, KIND_MASS, v) : status;
 }

@@ -51,6 +51,10 @@ static Status keep(Instance *instance, Stage *stage, const double p[], const dou
     return STATUS_OK;
 }
 
+Status move_keeping_momentum(Instance *instance, Stage *stage, unsigned kinds, double rate[3]) {
+    return keep(instance, stage, instance->now.p, instance->now.c, kinds, rate);
+}
+
 Status rate_on_the_way(Instance *instance, const double p[], const double c[], double rate[3]) {
     Stage stage;
     Status status = STATUS_OK;

@@ -6,12 +6,12 @@ Status rate_on_the_way(Instance *instance, const double p[], const double c[], d
     return STATUS_OK;
 }
 
-Status changes_forward(Instance *instance, Variation *v) {
-    (void)instance, (void)v;
+Status rate_on_the_way_forward(Instance *instance, const Variation *v, double change[3]) {
+    (void)instance, (void)v, (void)change;
     return STATUS_OK;
 }
 
-Status changes_reverse(Instance *instance, Variation *v) {
-    (void)instance, (void)v;
+Status rate_on_the_way_reverse(Instance *instance, double weight[3], Variation *v) {
+    (void)instance, (void)weight, (void)v;
     return STATUS_OK;
 }

@@ -42,7 +42,11 @@ int keep_momentum(const double **arg, double **res, int *iw, double *w, int mem)
 int keep_momentum_forward(const double **arg, double **res, int *iw, double *w, int mem);
 int keep_momentum_reverse(const double **arg, double **res, int *iw, double *w, int mem);
 int contact_momentum(const double **arg, double **res, int *iw, double *w, int mem);  /* p, k -> momentum */
+int contact_momentum_forward(const double **arg, double **res, int *iw, double *w, int mem);
+int contact_momentum_reverse(const double **arg, double **res, int *iw, double *w, int mem);
 int docked_rate(const double **arg, double **res, int *iw, double *w, int mem);       /* omega, momentum, d -> omega */
+int docked_rate_forward(const double **arg, double **res, int *iw, double *w, int mem);
+int docked_rate_reverse(const double **arg, double **res, int *iw, double *w, int mem);
 
 /* Of these a scene has those that its propagator uses. */
 int fastest_square(const double **arg, double **res, int *iw, double *w, int mem);    /* x, u, c -> rad2/s2 */

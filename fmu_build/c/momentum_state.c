@@ -67,30 +67,53 @@ bool changes_moved(const Instance *instance) {
     return memcmp(instance->now.kept_momentum, &instance->now.values[REFERENCE_STATES + 4], 3 * sizeof(double)) != 0;
 }
 
-void changes_start_forward(Instance *instance, Variation *v) {
-    double momentum[3];
-    instance->arg[0] = instance_x(instance) + 4;
-    instance->arg[1] = instance->now.c;
-    instance->arg[2] = v->x + 4;
-    instance->arg[3] = v->c;
+static void momentum_change(Instance *instance, const double change[3], const double dc[], double momentum[3]) {
+    const double *const arguments[] = {instance_x(instance) + 4, instance->now.c, change, dc};
+    memcpy(instance->arg, arguments, sizeof arguments);
     instance->res[0] = momentum;
     momentum_of_forward(instance->arg, instance->res, instance->iw, instance->w, 0);
+}
+
+static void momentum_weights(Instance *instance, const double weight[3], double on_rate[3], double on_composite[]) {
+    const double *const arguments[] = {instance_x(instance) + 4, instance->now.c, weight};
+    memcpy(instance->arg, arguments, sizeof arguments);
+    instance->res[0] = on_rate;
+    instance->res[1] = on_composite;
+    momentum_of_reverse(instance->arg, instance->res, instance->iw, instance->w, 0);
+}
+
+void changes_start_forward(Instance *instance, Variation *v) {
+    double momentum[3];
+    momentum_change(instance, v->x + 4, v->c, momentum);
     memcpy(v->x + 4, momentum, sizeof momentum);
 }
 
 void changes_start_reverse(Instance *instance, Variation *v) {
     double rate[3], c[COMPOSITE_COUNT];
-    instance->arg[0] = instance_x(instance) + 4;
-    instance->arg[1] = instance->now.c;
-    instance->arg[2] = v->x + 4;
-    instance->res[0] = rate;
-    instance->res[1] = c;
-    momentum_of_reverse(instance->arg, instance->res, instance->iw, instance->w, 0);
+    momentum_weights(instance, v->x + 4, rate, c);
     memcpy(v->x + 4, rate, sizeof rate);
     for (size_t i = 0; i < COMPOSITE_COUNT; i++) v->c[i] += c[i];
 }
 
-/* The rate that the states of model exchange stand for follows from the inputs by itself. */
+bool exchange_follows(const Instance *instance) {
+    return docks_moved(instance);
+}
+
+void exchange_forward(Instance *instance, const double change[3], Variation *v) {
+    double momentum[3];
+    momentum_change(instance, change, v->c, momentum);
+    for (size_t i = 0; i < 3; i++) v->x[4 + i] += momentum[i];
+}
+
+void exchange_reverse(Instance *instance, const Variation *v, double weight[3], double on_composite[]) {
+    double c[COMPOSITE_COUNT];
+    momentum_weights(instance, v->x + 4, weight, c);
+    for (size_t i = 0; i < COMPOSITE_COUNT; i++) on_composite[i] += c[i];
+}
+
+#if DOCK_COUNT == 0
+
+/* The momentum stays as it is, and the rate follows from it and the inputs by itself. */
 Status changes_forward(Instance *instance, Variation *v) {
     (void)instance, (void)v;
     return STATUS_OK;
@@ -100,3 +123,5 @@ Status changes_reverse(Instance *instance, Variation *v) {
     (void)instance, (void)v;
     return STATUS_OK;
 }
+
+#endif

@@ -17,8 +17,8 @@ Status exchange_check_continuous(Instance *instance, const double p[]) {
         const Variable *variable = &VARIABLES[REFERENCE_P + i];
         return instance_refuse(instance,
                                "%s = %.10g%s%s: changed from %.10g in continuous-time mode, but %s keep the angular "
-                               "momentum and %s the angular velocity, so that its rate would have to be known; change "
-                               "it in event mode",
+                               "momentum and %s the angular velocity, so that its rate would have to be known; it is "
+                               "discrete: change it in event mode",
                                variable->name, p[i], variable->unit[0] ? " " : "", variable->unit,
                                instance->now.stepped_p[i], POSES_KEEP_MOMENTUM ? "poses" : "masses",
                                POSES_KEEP_MOMENTUM ? "masses" : "poses");
@@ -36,6 +36,21 @@ void exchange_commit(Instance *instance) {
 
 bool changes_moved(const Instance *instance) {
     return memcmp(instance->now.kept_rate, &instance->now.values[REFERENCE_STATES + 4], 3 * sizeof(double)) != 0;
+}
+
+bool exchange_follows(const Instance *instance) {
+    (void)instance;
+    return true;
+}
+
+void exchange_forward(Instance *instance, const double change[3], Variation *v) {
+    (void)instance;
+    for (size_t i = 0; i < 3; i++) v->x[4 + i] += change[i];
+}
+
+void exchange_reverse(Instance *instance, const Variation *v, double weight[3], double on_composite[]) {
+    (void)instance, (void)on_composite;
+    memcpy(weight, v->x + 4, 3 * sizeof(double));
 }
 
 void changes_start_forward(Instance *instance, Variation *v) {

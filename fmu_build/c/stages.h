@@ -19,4 +19,7 @@ bool move_stage(Stage *stage, const double p[], unsigned kinds);
 /* Makes a stage's composite current, and judges it; kept_momentum.c has it. */
 Status weigh_stage(Instance *instance, Stage *stage);
 
+/* Lets inputs of some kinds be as they are now; the rate [rad/s] follows, keeping the momentum; kept_momentum.c has it. */
+Status move_keeping_momentum(Instance *instance, Stage *stage, unsigned kinds, double rate[3]);
+
 #endif

@@ -10,6 +10,7 @@ BOOLEANS = frozenset({"docks", "booleans"})
 CHANGES = frozenset(
     {
         "changes",
+        "change_derivatives",
         "no_changes",
         "docking",
         "momentum_state",
@@ -68,12 +69,11 @@ def _for_changes(model: Equations) -> frozenset[str]:
     if model.change is None:
         return frozenset({"no_changes"})
     found = {"changes", "exchange_state", "kept_in_changes"}
+    keeps_some, by_momentum = "momentum" in scene.keeps.values(), keeps_momentum(scene)
+    found.add("momentum_state" if by_momentum else "rate_state")
+    found.add("kept_momentum" if keeps_some else "kept_rate")
     if scene.inputs.docked:
         found.add("docking")
-    if keeps_momentum(scene):
-        found |= {"momentum_state", "kept_momentum"}
-    elif "momentum" in scene.keeps.values():
-        found |= {"rate_state", "kept_momentum", "kept_derivatives"}
-    else:
-        found |= {"rate_state", "kept_rate"}
+    if scene.inputs.docked or not by_momentum:
+        found |= {"change_derivatives"} | ({"kept_derivatives"} if keeps_some else set())
     return frozenset(found)

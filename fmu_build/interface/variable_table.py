@@ -85,9 +85,8 @@ def variable_table(model: Equations, naming: Naming = "structured") -> tuple[Tab
         "derivative": resolved.derivatives,
     }
     first = _first_references(groups)
-    knowns = [*range(first["state"], first["state"] + 7)]
     inputs = list(enumerate(resolved.inputs, start=first["input"]))
-    knowns += [reference for reference, variable in inputs if variable.part != "contact"]
+    knowns = [*range(first["state"], first["state"] + 7), *(reference for reference, _ in inputs)]
     booleans = frozenset(reference for reference, variable in inputs if variable.boolean)
     by_role, at_start = _dependencies(model, knowns, booleans)
     whole = magnitudes_at_start(resolved.scene)
@@ -127,26 +126,29 @@ def _first_references(groups: Mapping[Role, Sequence[Variable]]) -> dict[Role, i
 
 
 def _dependencies(model: Equations, knowns: Sequence[int], booleans: Set[int]) -> tuple[Rows, Rows]:
-    """Returns what outputs and derivatives depend on in flight; and what they and the states do at the start.
+    """Returns what outputs and derivatives depend on in flight, and what they and the states do at the start.
 
-    In flight they depend on states and inputs. At the start attitude and angular velocity are given in place
-    of the states, and the states depend on these and on inputs.
+    In flight they depend on states and inputs; events count too, with the motion of parts that dock. At the
+    start attitude and angular velocity are given in place of the states, and the states depend on these and
+    on inputs.
 
-    knowns   : value references of states and inputs (p, u); the motion with which a part docks (k) is left
-               out, as it acts at the instant of docking alone
+    knowns   : value references of states and inputs (p, k, u)
     booleans : the value references among them that are Booleans
     """
-    p, u, z = (ca.SX.sym(*s) for s in (("p", len(model.names.p)), ("u", len(model.names.u)), ("z", 7)))
+    names = model.names
+    p, k, u, z = (
+        ca.SX.sym(*s) for s in (("p", len(names.p)), ("k", len(names.k)), ("u", len(names.u)), ("z", 7))
+    )
     c = model.composite(p)
     # principal moments and axes follow from every element of the inertia, and not linearly
     a = ca.repmat(ca.sumsqr(c[model.slices.composite["inertia"]]), model.axes.numel_out(0))
-    known = ca.vertcat(z, p, u)
+    known = ca.vertcat(z, p, k, u)
     rows_of = _rows if model.composite.n_instructions() <= LONGEST_CODE else _rows_by_structure
 
     def rows(unknowns: Mapping[Role, ca.SX]) -> Rows:
         return {role: rows_of(unknown, known, knowns, booleans) for role, unknown in unknowns.items()}
 
-    follows = _after_change(model, z, p, c)
+    follows = _after_change(model, z, (p, k), c)
     now = rows(
         {
             "output": model.exchange.outputs(follows, u, c, a, 0.0),
@@ -162,21 +164,27 @@ def _dependencies(model: Equations, knowns: Sequence[int], booleans: Set[int]) -
     return now, rows({"output": model.outputs(z, u, c, a, 0.0), "derivative": rate, "state": begun})
 
 
-def _after_change(model: Equations, z: ca.SX, p: ca.SX, c: ca.SX) -> ca.SX:
+def _after_change(model: Equations, z: ca.SX, inputs: tuple[ca.SX, ca.SX], c: ca.SX) -> ca.SX:
     """Returns an expression whose structure shows what the states depend on after a change of inputs, (7,).
 
+    inputs : p and k
     Only its structure has a meaning. An angular momentum is kept when a mass or a pose changes. An angular
     velocity jumps then by an amount that depends on the inputs before and after. When a dock opens or
-    closes, both jump.
+    closes, both jump, by what all inputs of the composite and the motion at contact make of them.
     """
-    if model.change is None:
+    change, scene, (p, k) = model.change, model.resolved.scene, inputs
+    if change is None:
         return z
-    rate, scene = z[4:], model.resolved.scene
-    if "momentum" in scene.keeps.values() and not keeps_momentum(scene):
-        rate += model.change.keep_momentum(ca.SX.sym("kept", 3), ca.SX.sym("before", c.numel()), c)
-    shaping = zip(model.resolved.shaping, ca.vertsplit(p), strict=True)
-    flags = [flag for variable, flag in shaping if variable.boolean]
-    return ca.vertcat(z[:4], rate + sum(flags, ca.SX(0)))
+    by_momentum = keeps_momentum(scene)
+    kept, jump = ca.SX.sym("kept", 3), ca.SX.zeros(3)
+    if "momentum" in scene.keeps.values() and not by_momentum:
+        jump += change.keep_momentum(kept, ca.SX.sym("before", c.numel()), c)
+    if scene.inputs.docked:
+        docked = change.docked_rate(kept, change.contact_momentum(p, k), c)
+        jump += change.momentum_of(docked, c) if by_momentum else docked
+        shaping = zip(model.resolved.shaping, ca.vertsplit(p), strict=True)
+        jump += sum((flag for variable, flag in shaping if variable.boolean), ca.SX(0))
+    return ca.vertcat(z[:4], z[4:] + jump)
 
 
 def _rows(

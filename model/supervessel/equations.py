@@ -237,17 +237,24 @@ def _exchange_functions(
 
 
 def _changing(scene: Scene, change: Change | None) -> tuple[ca.Function, ...]:
-    """Returns the functions of a change that the FMU needs.
+    """Returns the functions of a change that the FMU needs, those that it differentiates with derivatives.
 
-    The first of them comes with its derivatives: momentum_of where the angular momentum is a state of model
-    exchange, else keep_momentum.
+    Where the angular momentum is a state of model exchange, it changes by docks alone: without docks the
+    derivatives of keep_momentum are not needed.
     """
     if change is None:
         return ()
-    functions = [change.momentum_of, change.rate_of_momentum] if keeps_momentum(scene) else []
-    functions += [change.keep_momentum] if "momentum" in scene.keeps.values() else []
-    for function in functions[:1]:
-        arguments = [ca.SX.sym(f"v{i}", function.numel_in(i)) for i in range(function.n_in())]
-        functions += derivatives(function.name(), arguments, [function(*arguments)])
-    docking = (change.contact_momentum, change.docked_rate) if scene.inputs.docked else ()
-    return (*functions, *docking)
+    docked, by_momentum = bool(scene.inputs.docked), keeps_momentum(scene)
+    plain: list[ca.Function] = [change.rate_of_momentum] if by_momentum else []
+    differentiated = [change.momentum_of] if by_momentum else []
+    if "momentum" in scene.keeps.values():
+        (differentiated if docked or not by_momentum else plain).append(change.keep_momentum)
+    if docked:
+        differentiated += [change.contact_momentum, change.docked_rate]
+    return (*plain, *differentiated, *(found for f in differentiated for found in _derivatives_of(f)))
+
+
+def _derivatives_of(function: ca.Function) -> tuple[ca.Function, ca.Function]:
+    """Returns the derivatives of a function of one result, see `derivatives`."""
+    arguments = [ca.SX.sym(f"v{i}", function.numel_in(i)) for i in range(function.n_in())]
+    return derivatives(function.name(), arguments, [function(*arguments)])
