@@ -14,7 +14,7 @@ LOWEST := tests/model tests/orbiter tests/build/test_build.py tests/build/test_s
   tests/twin/test_twin.py tests/twin/test_twin_reference.py tests/twin/test_error_state.py tests/trade/test_trade.py \
   tests/examples/test_lqr_hold.py tests/examples/test_identify.py
 
-.PHONY: run test check lowest constraints platforms robustness stability accuracy surroundings bench compatibility slews peers clean
+.PHONY: run test check lowest constraints platforms robustness stability accuracy surroundings bench compatibility slews peers importers clean
 
 run: .venv/installed
 	$(BIN)/python -m fmu_build examples/iss_dg.toml -o build/iss_dg.fmu
@@ -96,6 +96,13 @@ peers: .venv-peers/installed
 	PYTHONPATH=tests:tests/bench .venv-peers/bin/python tests/peers/work.py
 	PYTHONPATH=tests:tests/bench .venv-peers/bin/python tests/peers/composites.py
 
+# Flies all cells whatever the first ones do, writes the table, then fails if one of them did.
+importers: .venv-importers/installed
+	.venv-importers/bin/python tests/importers/tools.py
+	status=0; export SUPERVESSEL_CACHE="$(CURDIR)/build/importers/cache"; \
+	  .venv-importers/bin/python -m pytest -m importers tests/importers || status=$$?; \
+	  PYTHONPATH=tests .venv-importers/bin/python -m importers.page && exit $$status
+
 clean:
 	rm -rf .venv .venv-* build .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
@@ -125,4 +132,10 @@ clean:
 	.venv-peers/bin/python -m pip install --quiet --editable . scipy mpmath
 	@for p in mujoco drake bsk pin pythonfmu; do .venv-peers/bin/python -m pip install --quiet $$p || \
 	  echo "$$p cannot be installed here: skipped"; done
+	touch $@
+
+.venv-importers/installed: pyproject.toml tests/constraints.txt
+	$(PYTHON) -m venv .venv-importers
+	.venv-importers/bin/python -m pip install --quiet --upgrade -c tests/constraints.txt 'pip>=25.3'
+	.venv-importers/bin/python -m $(PIP) install --quiet $(CONSTRAINTS) --editable . pytest scipy mpmath
 	touch $@
