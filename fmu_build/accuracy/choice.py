@@ -71,16 +71,16 @@ def choose(scene: Scene, progress: Progress = lambda _: None) -> tuple[Scene, di
     if kept is None:
         kept = _chosen(whole, accuracy, progress)
         keep(place, kept)
+    watched = accuracy.error_bound and kept["grade"]["name"] != PROVEN
+    outputs = _watching(scene.outputs) if watched else scene.outputs
     rotation = opened | kept["choice"]
-    if rotation["law"] == "none":  # keeps the rate always
+    if rotation["law"] == "none" and WATCH not in outputs.names:  # the rate stays, and nobody asks what would
         rotation = {
             key: value for key, value in rotation.items() if key not in ("mass_change", "pose_change")
         }
     chosen = Rotation.model_validate(rotation)
     if scene.is_chosen and scene.rotation != chosen:
         raise AccuracyError("accuracy: [rotation] has been changed since it was chosen")
-    watched = accuracy.error_bound and kept["grade"]["name"] != PROVEN
-    outputs = _watching(scene.outputs) if watched else scene.outputs
     return scene.model_copy(update={"rotation": chosen, "outputs": outputs}), kept | {"watched": watched}
 
 

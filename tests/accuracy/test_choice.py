@@ -20,7 +20,7 @@ from fmu_build.flight.workshop import build_all, source_of, workshop
 from supervessel import AccuracyError, Twin, choose, parse_scene
 from supervessel.equations import equations
 from supervessel.scene.schema import without_accuracy
-from support import ISS_DG, variant
+from support import ISS_DG, OK, Instance, variant
 from support.processes import kept_in
 
 ACCURACY = {"attitude": 1e-4, "horizon": 20.0, "step": 0.5}
@@ -331,3 +331,23 @@ def test_what_is_not_proven_is_watched_unless_the_scene_says_otherwise(tmp_path)
     spinning, proven = choose(parse_scene(SPIN))
     assert (proven["grade"]["name"], proven["watched"]) == ("proven", False)
     assert "error_bound" not in spinning.outputs.names
+
+
+def test_what_the_true_motion_keeps_counts_for_the_bound_of_a_law_that_keeps_the_rate():
+    """A mass that grows by 1e-7 of itself: as the momentum stays, a spin of 0.1 rad/s slows by 1e-8 rad/s."""
+    changes = {
+        "inputs": {"mass": ["B"], "range": {"B.mass": [1.0, 1.0000001]}},
+        "rotation.mass_change": "momentum",
+        "outputs": {"names": ["attitude", "angular_velocity", "error_bound"]},
+    }
+    chosen, evidence = choose(parse_scene(variant(SPIN, changes)))
+    assert (chosen.rotation.law, evidence["grade"]["name"]) == ("none", "proven")
+    instance = Instance(
+        chosen.model_dump(mode="json", exclude_none=True, exclude={"accuracy"}), optimised=False
+    )
+    assert instance.initialise() == OK
+    assert instance.set({"B.mass": 1.0000001}) == OK
+    assert instance.step(0.1) == OK
+    off, bound = 0.1 * (0.1 - 0.1 / 1.0000001), instance.get("error_bound")
+    instance.free()
+    assert off <= bound <= 1.01 * off

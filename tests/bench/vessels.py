@@ -66,7 +66,7 @@ def command(host: Path, scene: Scene, folder: Path, repeats: int) -> tuple[list[
     """Returns the words that time a scene's composite, and its inputs."""
     library, counts = compiled(scene, folder)
     inputs = p_start(scene)
-    words = [host, library, f"{scene.name}_composite", len(inputs), counts["COMPOSITE_COUNT"]]
+    words = [host, library, f"{scene.name}_fmi3_composite", len(inputs), counts["COMPOSITE_COUNT"]]
     return [*map(str, words), str(counts["WORK_REAL"]), str(repeats)], " ".join(map(repr, map(float, inputs)))
 
 

@@ -26,13 +26,11 @@ def showing(raw: Mapping[str, Any], **rotation: Any) -> dict[str, Any]:
 def tug(law: str, propagator: str = "rk4", *, mass: str = "rate", pose: str = "momentum") -> dict[str, Any]:
     """Returns a tug with a tank that it loses and takes up again on an arm that moves, under a law.
 
-    mass, pose : what changes of them keep; under "none" the rate always stays, and only the truth keeps more
+    mass, pose : what changes of them keep; under "none" the rate always stays, and the truth alone keeps it
     """
     raw = showing(TUG, law=law, propagator=propagator, max_angle_step=0.2)
     raw["inputs"] |= {"pmi": ["tank"]} | ({} if law == "none" or pose == "rate" else {"motion": ["tug.arm"]})
-    rules: Any = dict.fromkeys(("mass_change", "pose_change")) if law == "none" else {}
-    rules = rules or {"mass_change": mass, "pose_change": pose}
-    return variant(raw, {f"rotation.{key}": value for key, value in rules.items()})
+    return variant(raw, {"rotation.mass_change": mass, "rotation.pose_change": pose})
 
 
 @cache

@@ -35,6 +35,7 @@ def without_motion(law: str, propagator: str, **rotation: Any) -> dict[str, Any]
 
 FLOWN = {
     "none, rk4": tug("none"),
+    "none, rk4, masses keep momentum": tug("none", mass="momentum", pose="rate"),
     "principal, rk4": tug("principal", mass="momentum"),
     "decoupled, taylor": without_motion("decoupled", "taylor"),
     "principal, dop853": tug("principal", "dop853"),

@@ -186,6 +186,13 @@ def _propagator(raw: Mapping[str, Any]) -> Iterator[str]:
         yield f'rotation.propagator = "{name}": {reason}'
 
 
+def _shows_bound(raw: Mapping[str, Any]) -> bool:
+    """Whether `error_bound` is an output: what the true motion keeps then counts under every law."""
+    outputs = raw.get("outputs", {})
+    names = outputs.get("names", ()) if isinstance(outputs, Mapping) else ()
+    return isinstance(names, list | tuple) and "error_bound" in names
+
+
 def _changes(raw: Mapping[str, Any]) -> Iterator[str]:
     """Yields why mass_change or pose_change does not suit the scene's law and inputs."""
     rotation, inputs = (raw.get(key, {}) for key in ("rotation", "inputs"))
@@ -193,7 +200,7 @@ def _changes(raw: Mapping[str, Any]) -> Iterator[str]:
         return
     if rotation.get("law") == "none":
         for key in ("mass_change", "pose_change"):
-            if rotation.get(key) == "momentum":
+            if rotation.get(key) == "momentum" and not _shows_bound(raw):
                 reason = 'must be "rate" for rotation.law = "none": the rate never changes'
                 yield f'rotation.{key} = "momentum": {reason}'
         if inputs.get("motion"):

@@ -323,8 +323,8 @@ class Scene(Table):
         if inputs.mass or inputs.pmi:
             kinds["mass"] = rotation.mass_change
         if inputs.pose:
-            kinds["pose"] = rotation.pose_change or ("rate" if rotation.law == "none" else "momentum")
-        return kinds
+            kinds["pose"] = rotation.pose_change or "momentum"
+        return dict.fromkeys(kinds, "rate") if rotation.law == "none" else kinds
 
 
 def keeps_momentum(scene: Scene) -> bool:
