@@ -64,6 +64,7 @@ def courses(name: str, fmi: int, share: float = 1.0) -> list[dict[str, float]]:
     torque = fastest / SPAN * np.linalg.norm(np.array(twin(name).composite(twin(name).p_start)[2]), 2)
     drift = {known: share * rng.uniform(0.5, 1.0) for known in inputs["continuous"]}
     jump = {known: start[known] * rng.uniform(0.9, 1.1) + 0.2 * rng.normal() for known in inputs["discrete"]}
+    jump |= {known: 1.0 - start[known] for known in jump if known.endswith(".docked")}
     rows = []
     for i in range(COUNT + 1):
         moved = {known: jump[known] if 2 * i >= COUNT else start[known] for known in jump}
