@@ -57,7 +57,7 @@ robustness: .venv/installed-dev
 	$(BIN)/python -m pytest -m robustness tests/robustness
 
 stability: .venv/installed-dev
-	$(BIN)/python -m pytest -m stability tests/stability
+	$(BIN)/python -m pytest -m stability tests
 	cd tests && ../$(BIN)/python -m stability.table
 
 accuracy: .venv/installed-dev

@@ -41,7 +41,7 @@ OUTPUTS = {
 }
 
 
-@pytest.mark.parametrize("law", ["tensor", "decoupled"])
+@pytest.mark.parametrize("law", ["tensor", pytest.param("decoupled", marks=pytest.mark.stability)])
 @pytest.mark.parametrize("value", VALUES)
 @pytest.mark.parametrize("place", PLACES)
 def test_a_scene_of_extreme_numbers_is_refused_or_made_without_a_warning(place, value, law):

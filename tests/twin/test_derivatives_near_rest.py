@@ -104,7 +104,7 @@ def blocks(jacobian: np.ndarray) -> list[np.ndarray]:
     return [jacobian[rows, part] for rows in (slice(0, 4), slice(4, 7)) for part in columns]
 
 
-@pytest.mark.parametrize("propagator", ["exact", "split"])
+@pytest.mark.parametrize("propagator", ["exact", pytest.param("split", marks=pytest.mark.stability)])
 @pytest.mark.parametrize("name", MOMENTS)
 @pytest.mark.parametrize(("rate", "h"), [*((angle / 0.8, 0.8) for angle in ANGLES), (0.9, 1e-9)])
 def test_derivatives_are_right_however_little_the_body_turns(propagator, name, rate, h):
