@@ -6,8 +6,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fmu_build.interface.names import NAMINGS
-from fmu_build.platforms import PLATFORMS, Platform, platforms_named
+from fmu_build.options import add_build_options, platforms_of
+from fmu_build.platforms import Platform
 from fmu_build.versions import NEWEST, VERSIONS
 from supervessel.problems import printable
 from supervessel.shell.console import Parser, print_problem, print_results, show_progress
@@ -34,26 +34,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--fmi", type=int, choices=tuple(VERSIONS), default=NEWEST, help="FMI version (default: %(default)s)"
     )
-    parser.add_argument(
-        "--platform",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="NAME",
-        help=f"to compile for (default: this machine's): {', '.join(p.name for p in PLATFORMS)}; or all",
-    )
-    parser.add_argument(
-        "--names",
-        choices=NAMINGS,
-        default=NAMINGS[0],
-        help="of the FMU's variables: DG.nose.position[1], or flat DG_nose_position_1 (default: %(default)s)",
-    )
+    add_build_options(parser)
     options = parser.parse_args(arguments)
-    try:
-        platforms = platforms_named(options.platform)
-    except ValueError as error:
-        parser.error(f"--platform: {error}")
-    return _build(options, platforms)
+    return _build(options, platforms_of(parser, options))
 
 
 def _build(options: argparse.Namespace, platforms: Sequence[Platform]) -> int:

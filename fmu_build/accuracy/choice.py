@@ -10,7 +10,7 @@ import numpy as np
 from fmu_build.accuracy.flights import LONG
 from fmu_build.accuracy.grades import GRADES, LAW_PROVEN, PROVEN, grade_of
 from fmu_build.accuracy.search import MARGIN, Progress, Search, Tried, begun
-from fmu_build.flight.choices import BEST, Choice, reference_choices
+from fmu_build.flight.choices import BEST, Choice, keeping_rate, reference_choices
 from fmu_build.flight.results import are_numbers, keep, place_of, read
 from fmu_build.flight.workshop import workshop
 from supervessel.problems import AccuracyError
@@ -75,9 +75,7 @@ def choose(scene: Scene, progress: Progress = lambda _: None) -> tuple[Scene, di
     outputs = _watching(scene.outputs) if watched else scene.outputs
     rotation = opened | kept["choice"]
     if rotation["law"] == "none" and WATCH not in outputs.names:  # the rate stays, and nobody asks what would
-        rotation = {
-            key: value for key, value in rotation.items() if key not in ("mass_change", "pose_change")
-        }
+        rotation = keeping_rate(rotation)
     chosen = Rotation.model_validate(rotation)
     if scene.is_chosen and scene.rotation != chosen:
         raise AccuracyError("accuracy: [rotation] has been changed since it was chosen")

@@ -8,8 +8,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 from fmu_build.errors import BuildError
-from fmu_build.interface.names import NAMINGS
-from fmu_build.platforms import PLATFORMS, Platform, host_platform, platforms_named
+from fmu_build.options import add_build_options, platforms_of
+from fmu_build.platforms import Platform, host_platform
 from supervessel.problems import printable
 from supervessel.shell.console import Parser, print_problem, print_results, show_progress
 from supervessel.shell.ending import say
@@ -29,23 +29,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="FOLDER", help="the folder to make, a new one"
     )
-    parser.add_argument(
-        "--platform",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="NAME",
-        help=f"to compile for (default: this machine's): {', '.join(p.name for p in PLATFORMS)}; or all",
-    )
-    parser.add_argument(
-        "--names", choices=NAMINGS, default=NAMINGS[0], help="of variables (default: %(default)s)"
-    )
+    add_build_options(parser)
     options = parser.parse_args(arguments)
-    try:
-        platforms = platforms_named(options.platform)
-    except ValueError as error:
-        parser.error(f"--platform: {error}")
-    return _offer(options, platforms)
+    return _offer(options, platforms_of(parser, options))
 
 
 def _offer(options: argparse.Namespace, platforms: Sequence[Platform]) -> int:

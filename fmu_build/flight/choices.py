@@ -171,6 +171,11 @@ def by_angle(model: Model, *, quick: bool) -> list[Choice]:
     return [Choice(model, "rk4", angle) for angle in (QUICK_ANGLES if quick else ANGLES)]
 
 
+def keeping_rate(rotation: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns [rotation] without what changes keep: under the law "none" that is the rate always."""
+    return {key: value for key, value in rotation.items() if key not in ("mass_change", "pose_change")}
+
+
 def variant_of(scene: Scene, choice: Choice) -> Scene:
     """Returns the scene that a choice is built from; a tolerance is left to whoever flies it."""
     raw: dict[str, Any] = scene.model_dump(exclude_none=True)
@@ -178,10 +183,8 @@ def variant_of(scene: Scene, choice: Choice) -> Scene:
     rotation = raw["rotation"] | {"law": choice.model.law, "propagator": choice.propagator}
     if choice.angle is not None:
         rotation["max_angle_step"] = choice.angle
-    if choice.model.law == "none":  # keeps the rate always
-        rotation = {
-            key: value for key, value in rotation.items() if key not in ("mass_change", "pose_change")
-        }
+    if choice.model.law == "none":
+        rotation = keeping_rate(rotation)
     raw["rotation"] = rotation
     names = list(raw["outputs"]["names"])
     raw["outputs"] = {"names": [*names, *(name for name in SHOWN if name not in names)]}
