@@ -4,7 +4,8 @@ Symbols, each a column vector; units and axes are those of the FMU's variables:
 
     p : the inputs that shape the composite: masses [kg], moments [m2], poses and motions of ports, docks
     k : the motion with which parts dock, velocities [m/s] and rates [rad/s]
-    u : the inputs that act, torques [N m] and forces [N]
+    u : the inputs that torques follow from: torques [N m] and forces [N], then position [m] and velocity
+        [m/s] in a field of gravity
     x : the state, (7,): attitude q_inertial_body, angular velocity [rad/s], body axes
     z : the state of model exchange, (7,): x, or attitude and angular momentum [N m s], body axes, where every
         change of inputs keeps the momentum; see `rotation.exchange`
@@ -206,7 +207,7 @@ def equations(scene: Scene) -> Equations:
 
 
 def _names(resolved: ResolvedScene) -> VariableNames:
-    inputs = (resolved.shaping, resolved.contact, resolved.acting)
+    inputs = (resolved.shaping, resolved.contact, resolved.turning)
     p, k, u, z = (tuple(v.name for v in variables) for variables in (*inputs, resolved.states))
     return VariableNames(p, k, u, z, resolved.output_names)
 

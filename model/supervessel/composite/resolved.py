@@ -62,7 +62,7 @@ class ResolvedScene:
 
     @cached_property
     def inputs(self) -> tuple[InputVariable, ...]:
-        """All inputs in the order of the model description: `shaping`, `contact`, `acting`."""
+        """All inputs in the order of the model description: `shaping`, `contact`, `acting`, `field`."""
         return input_variables(self.scene)
 
     @cached_property
@@ -77,8 +77,18 @@ class ResolvedScene:
 
     @cached_property
     def acting(self) -> tuple[InputVariable, ...]:
-        """The inputs u that act: torques and forces."""
+        """The inputs that act: torques and forces."""
         return tuple(variable for variable in self.inputs if variable.part == "action")
+
+    @cached_property
+    def field(self) -> tuple[InputVariable, ...]:
+        """The inputs that say where the body is in a field of gravity: position, then velocity, or none."""
+        return tuple(variable for variable in self.inputs if variable.part == "field")
+
+    @cached_property
+    def turning(self) -> tuple[InputVariable, ...]:
+        """The inputs u that torques follow from: `acting`, then `field`."""
+        return self.acting + self.field
 
     @cached_property
     def changes(self) -> frozenset[Change]:

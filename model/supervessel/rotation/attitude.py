@@ -41,6 +41,19 @@ def to_inertial(attitude: ca.SX, vector_body: ca.SX) -> ca.SX:
     return vector_body + w * twice + ca.cross(axis, twice)
 
 
+def to_body(attitude: ca.SX, vector_inertial: ca.SX) -> ca.SX:
+    """Returns a vector, (3,), in body axes, in its own unit: the inverse of `to_inertial`.
+
+    attitude        : q_inertial_body, (4,); of another length than 1 it changes the vector's length
+    vector_inertial : (3,), inertial axes
+    (w^2 - |v|^2) u + 2 (v . u) v - 2 w v x u is |q|^2 times the vector, whatever the length of q = (w, v).
+    """
+    w, axis = attitude[0], attitude[1:]
+    along, across = ca.dot(axis, vector_inertial), ca.cross(axis, vector_inertial)
+    same = (w * w - ca.sumsqr(axis)) * vector_inertial
+    return same + 2.0 * (along * axis - w * across)
+
+
 def product(first: ca.SX, second: ca.SX) -> ca.SX:
     """Returns the Hamilton product of two quaternions, (4,): q_A_C of q_A_B and q_B_C.
 

@@ -43,5 +43,5 @@ def states_by_momentum(change: Change, c: ca.SX, dynamics: Dynamics) -> Exchange
     z = ca.SX.sym("z", 7)
     attitude, momentum = z[:4], z[4:]
     omega = change.rate_of_momentum(momentum, c)
-    rate = ca.vertcat(attitude_dot(attitude, omega), dynamics.momentum_rate(omega, momentum))
+    rate = ca.vertcat(attitude_dot(attitude, omega), dynamics.momentum_rate(attitude, omega, momentum))
     return ExchangeStates(z, "z", rate, ca.vertcat(attitude, omega))

@@ -1,5 +1,6 @@
 """Steps in time as functions: a scene's method, how long its steps may be, and exact free motion."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
@@ -7,8 +8,9 @@ import casadi as ca
 from supervessel.rotation.axes import AxesGraph
 from supervessel.rotation.dynamics import Dynamics
 from supervessel.rotation.error_bound.remainder import has_sure_remainder
+from supervessel.rotation.lengths import smooth_length, smooth_root
 from supervessel.rotation.propagators import PROPAGATORS, Plan
-from supervessel.rotation.propagators.bound import fastest_square, longest_step, smooth_length
+from supervessel.rotation.propagators.bound import fastest_square, longest_step
 from supervessel.rotation.propagators.exact import free_functions, free_functions_of_start
 from supervessel.rotation.propagators.method import Step, StepSymbols
 from supervessel.rotation.rounding import turned_by_rounding
@@ -23,7 +25,8 @@ class StepFunctions:
                      scene's largest angle of a sub-step
     longest_step   : x, u, c -> that angle over that rate [s], with derivatives at rest and without torque too
     step           : x, u, c, h -> x after one sub-step of h [s]; its second result is the estimated error,
-                     (2,), where the method is controlled by it or the scene shows it
+                     (2,), where the method is controlled by it or the scene shows it; in a field of gravity
+                     its third one is position [m] and velocity [m/s] afterwards, (6,)
     error_exponent : power of h with which the estimated error grows
     propagation    : the functions that the scene's co-simulation uses: of fastest_square and step as many as
                      its method needs; by_torque: u, c -> angular acceleration by the torque alone, (3,)
@@ -47,18 +50,20 @@ def step_functions(
     symbols : x, u and c, of which `dynamics` is made
     A scene that has exact free motion alone is given the step of dop853, which its co-simulation never takes.
     """
-    x, h = symbols[0], ca.SX.sym("h")
+    h = ca.SX.sym("h")
     shown = "error_estimate" in scene.outputs.names
     estimated = shown or ("error_bound" in scene.outputs.names and not has_sure_remainder(scene.rotation))
+    state, rate = _extended(symbols[0], dynamics)
     motion = StepSymbols(
-        x,
-        dynamics.state_rate,
+        state,
+        rate,
         dynamics.law,
         dynamics.numbers,
         dynamics.torque,
         h,
         scene.rotation.tolerance,
         estimated,
+        dynamics.field,
     )
     method = plan.method or PROPAGATORS["dop853"]
     assert method.build is not None
@@ -77,6 +82,19 @@ def step_functions(
     )
 
 
+def _extended(x: ca.SX, dynamics: Dynamics) -> tuple[ca.SX, Callable[[ca.SX], ca.SX]]:
+    """Returns the state that a step carries on, and its rate as a function of it; see `StepSymbols`."""
+    field, size = dynamics.field, x.numel()
+    if field is None:
+        return x, dynamics.state_rate
+
+    def rate(state: ca.SX) -> ca.SX:
+        turning, orbit = state[:size], state[size:]
+        return ca.vertcat(dynamics.state_rate(turning, orbit[:3]), field.rate(orbit))
+
+    return ca.vertcat(x, field.start), rate
+
+
 def _rate_function(
     angle: float, motion: StepSymbols, dynamics: Dynamics, symbols: tuple[ca.SX, ca.SX, ca.SX]
 ) -> ca.Function:
@@ -85,8 +103,24 @@ def _rate_function(
     angle : largest angle of a sub-step [rad]
     """
     by_torque = ca.sqrt(ca.sumsqr(motion.acceleration_by_torque))
-    square = fastest_square(motion.state[4:], by_torque, motion.law.growth, angle, dynamics.spin_square)
+    square = _fastest_square(angle, motion, dynamics, by_torque)
     return ca.Function("fastest_square", [*symbols], [square], ["x", "u", "c"], ["rate_square"])
+
+
+def _fastest_square(angle: float, motion: StepSymbols, dynamics: Dynamics, by_torque: ca.SX) -> ca.SX:
+    """Returns the square [rad2/s2] of a rate that the body does not exceed while it turns by `angle` [rad].
+
+    by_torque : length of the acceleration by the constant torque [rad/s2]
+    In a field of gravity the direction to the centre turns too: relative to it the body turns no faster than
+    by the sum of both rates.
+    """
+    field, omega = motion.field, motion.state[4:7]
+    if field is None:
+        return fastest_square(omega, by_torque, motion.law.growth, angle, dynamics.spin_square)
+    pushed = by_torque + field.largest_acceleration(motion.law, motion.numbers)
+    square = fastest_square(omega, pushed, motion.law.growth, angle, dynamics.spin_square)
+    orbit = field.orbit_rate()
+    return square + orbit * (orbit + 2.0 * smooth_root(square))
 
 
 def _longest_step_function(
@@ -97,13 +131,21 @@ def _longest_step_function(
     angle : largest angle of a sub-step [rad]
     """
     by_torque = smooth_length(motion.acceleration_by_torque)
-    square = fastest_square(motion.state[4:], by_torque, motion.law.growth, angle, dynamics.spin_square)
+    square = _fastest_square(angle, motion, dynamics, by_torque)
     return ca.Function("longest_step", [*symbols], [longest_step(square, angle)], ["x", "u", "c"], ["h_max"])
 
 
 def _step_function(built: Step, symbols: tuple[ca.SX, ca.SX, ca.SX], h: ca.SX) -> ca.Function:
-    """Returns the function of a step, with its estimated error where it has one."""
-    results = {"x_next": built.state} | ({} if built.error is None else {"error": built.error})
+    """Returns the function of a step, with its estimated error where it has one.
+
+    In a field of gravity its third result is where the centre is afterwards, field_next, (6,) [m, m/s]; the
+    second one is then zero where there is no estimate.
+    """
+    size = symbols[0].numel()
+    x_next, field_next = built.state[:size], built.state[size:]
+    results = {"x_next": x_next} | ({} if built.error is None else {"error": built.error})
+    if field_next.numel():
+        results = {"x_next": x_next, "error": results.get("error", ca.SX.zeros(2)), "field_next": field_next}
     return ca.Function("step", [*symbols, h], [*results.values()], ["x", "u", "c", "h"], [*results])
 
 
@@ -112,7 +154,7 @@ def _rounding_function(
 ) -> ca.Function:
     """Returns rounding."""
     turning = dynamics.law.turning(dynamics.inertia)
-    angle = turned_by_rounding(turning, motion.state[4:], motion.acceleration_by_torque, h)
+    angle = turned_by_rounding(turning, motion.state[4:7], motion.acceleration_at_start, h)
     return ca.Function("rounding", [*symbols, h], [angle], ["x", "u", "c", "h"], ["angle"])
 
 

@@ -34,7 +34,7 @@ def consistency_problems(raw: Mapping[str, Any]) -> list[str]:
         for port, table in tables(vessel, "ports"):
             problems += direction_problems(f"{place}.ports.{toml_key(port)}", table)
     problems += [*_experiment(raw), *_accuracy(raw), *_ranges(raw), *_total_mass(raw)]
-    return [*problems, *_propagator(raw), *_changes(raw)]
+    return [*problems, *_gravity(raw), *_propagator(raw), *_changes(raw)]
 
 
 def _moments(place: str, vessel: Mapping[str, Any]) -> Iterator[str]:
@@ -134,7 +134,7 @@ def _without_range(inputs: Mapping[str, Any]) -> Iterator[str]:
     ranges = inputs.get("range")
     known = ranges if isinstance(ranges, Mapping) else {}
     for group, (kind, elements) in by_group(inputs).items():
-        if group in known or kind.boolean:
+        if group in known or kind.boolean or kind.part == "field":
             continue
         missing = [name for name in elements if name not in known]
         yield from missing if len(missing) < len(elements) else [group]
@@ -157,6 +157,21 @@ def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:
             yield f"{path}: low must not exceed high"
         elif kind and kind.lowest is not None and low < kind.lowest:
             yield f"{path}: {kind.noun} must be >= {kind.lowest:g} {kind.unit}"
+
+
+def _gravity(raw: Mapping[str, Any]) -> Iterator[str]:
+    """Yields why [gravity] and inputs.gravity do not go together, or from where the flight starts."""
+    inputs, gravity = raw.get("inputs", {}), raw.get("gravity")
+    asked = isinstance(inputs, Mapping) and inputs.get("gravity") is True
+    if asked and gravity is None:
+        yield "gravity.mu: missing; inputs.gravity = true needs the centre's gravitational parameter [m3/s2]"
+    if not isinstance(gravity, Mapping):
+        return
+    if not asked:
+        yield "gravity: without effect; put gravity = true under [inputs]"
+    for key in ("position", "velocity"):
+        if key not in gravity:
+            yield f"gravity.{key}: missing; the inputs gravity.position and gravity.velocity start from it"
 
 
 def _total_mass(raw: Mapping[str, Any]) -> Iterator[str]:

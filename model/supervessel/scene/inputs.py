@@ -3,8 +3,8 @@
 A new kind whose effect follows from inputs alone needs its row here, its key in `schema.Inputs`, and its
 equation: in `composite.bodies` if it shapes the composite, in `composite.actions` if it is a torque or a
 force. A torque that depends on attitude or rate besides needs `rotation.dynamics` (its rate of change),
-`rotation.steps` (how fast it grows), `twin.linear` and `twin.plant` (its derivatives, trim), and a word in
-the `suits` of propagators that cannot have it.
+`rotation.steps` (how fast it grows), `twin.twin` (trim), and a word in the `suits` of propagators that cannot
+have it; gravity's gradient, `rotation.gravity`, is one.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any, Literal
 if TYPE_CHECKING:
     from supervessel.scene.schema import Scene
 
-Part = Literal["shape", "contact", "action"]
-"""Use of an input: it shapes the composite, is the motion with which a part docks, or acts on the body."""
+Part = Literal["shape", "contact", "action", "field"]
+"""Use of an input: it shapes the composite, is the motion with which a part docks, acts on the body, or says
+where the body is in a field of gravity."""
 
 Change = Literal["mass", "pose", "docked", ""]
 """What changes with an input: masses and moments; poses and motion of ports; docks; "": none of these."""
@@ -286,6 +287,28 @@ VESSEL_TORQUE = InputKind(
     "external torque on {owner}, {axis} in its axes",
     _zero,
 )
+GRAVITY_POSITION = InputKind(
+    "gravity",
+    "gravity.position",
+    "",
+    3,
+    "m",
+    "field",
+    "",
+    "position of the barycentre from the attracting centre, {axis} in inertial axes",
+    lambda scene, owner: scene.gravity_start[0],
+)
+GRAVITY_VELOCITY = InputKind(
+    "gravity",
+    "gravity.velocity",
+    "",
+    3,
+    "m/s",
+    "field",
+    "",
+    "velocity of the barycentre relative to the attracting centre, {axis} in inertial axes",
+    lambda scene, owner: scene.gravity_start[1],
+)
 
 BLOCKS: tuple[tuple[InputKind, ...], ...] = (
     (MASS,),
@@ -296,8 +319,9 @@ BLOCKS: tuple[tuple[InputKind, ...], ...] = (
     (TORQUE,),
     (FORCE,),
     (VESSEL_TORQUE,),
+    (GRAVITY_POSITION, GRAVITY_VELOCITY),
 )
-"""All kinds, in the order of the model description: shape, contact, action.
+"""All kinds, in the order of the model description: shape, contact, action, field.
 
 The inputs of an owner that stand in one block follow each other; the first kind of a block lists the owners.
 """
@@ -331,8 +355,8 @@ def by_group(inputs: Mapping[str, Any]) -> dict[str, tuple[InputKind, list[str]]
 
 
 def acting(inputs: Mapping[str, Any]) -> bool:
-    """Whether the table `[inputs]` asks for a torque or a force."""
-    return any(kind.part == "action" for kind, _ in listed(inputs))
+    """Whether the table `[inputs]` asks for a torque or a force, gravity's included."""
+    return any(kind.part in ("action", "field") for kind, _ in listed(inputs))
 
 
 def listed(inputs: Mapping[str, Any]) -> Iterator[tuple[InputKind, str]]:

@@ -33,6 +33,7 @@ RESERVED = frozenset(
         *OUTPUTS,
         *(kind.quantity for kind in kinds() if kind.part != "shape"),
         "docked",
+        "gravity",
         "time",
         "state",
         "der",

@@ -169,6 +169,8 @@ Direction = Annotated[
     BeforeValidator(_direction),
     vector("", "three finite numbers, a direction of any length > 0"),
 ]  # validators run from the right
+Velocity = Annotated[Vector, vector("m/s", "three finite numbers")]
+Mu = Annotated[float, number("m3/s2", "a finite number > 0", 0.0, open_low=True)]
 AngularVelocity = Annotated[Vector, vector("rad/s", "three finite numbers")]
 Seconds = Annotated[float, number("s", "a finite number > 0", 0.0, open_low=True)]
 Angle = Annotated[float, number("rad", "a number from 1e-6 to 1", 1e-6, 1.0)]

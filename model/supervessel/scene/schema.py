@@ -22,6 +22,7 @@ from supervessel.scene.numbers import (
     Direction,
     Mass,
     Matrix,
+    Mu,
     Pmi,
     Position,
     RateError,
@@ -29,6 +30,7 @@ from supervessel.scene.numbers import (
     Tensor,
     Tolerance,
     Vector,
+    Velocity,
 )
 
 ORIGIN: Vector = (0.0, 0.0, 0.0)
@@ -160,6 +162,7 @@ class Inputs(Table):
     torque        : whether there is a torque about the barycentre
     force         : points, "vessel.point"
     vessel_torque : vessels
+    gravity       : whether the gradient of gravity turns the body, of the centre in `[gravity]`
     range         : lowest and highest value by an input's name, with or without index, in the input's unit
     """
 
@@ -171,7 +174,21 @@ class Inputs(Table):
     torque: Flag = False
     force: Names = ()
     vessel_torque: Names = ()
+    gravity: Flag = False
     range: dict[str, Bounds] = Field(default_factory=dict)
+
+
+class Gravity(Table):
+    """A centre whose gravity attracts the body as a mass point would.
+
+    mu       : gravitational parameter [m3/s2]
+    position : of the barycentre from the centre [m], inertial axes, at the start
+    velocity : of the barycentre relative to the centre [m/s], inertial axes, at the start
+    """
+
+    mu: Mu
+    position: Position | None = None
+    velocity: Velocity | None = None
 
 
 class Rotation(Table):
@@ -258,6 +275,7 @@ class Scene(Table):
     vessels: dict[str, Vessel]
     docks: tuple[Dock, ...] = ()
     inputs: Inputs = Inputs()
+    gravity: Gravity | None = None
     rotation: Rotation = Rotation()
     accuracy: Accuracy | None = None
     experiment: Experiment | None = None
@@ -296,6 +314,22 @@ class Scene(Table):
             if dock.name == name:
                 return dock
         raise KeyError(name)
+
+    @property
+    def gravity_start(self) -> tuple[Vector, Vector]:
+        """Position [m] and velocity [m/s] of the barycentre from the attracting centre at the start.
+
+        Both in inertial axes. Raises ValueError for a scene without `inputs.gravity`.
+
+        Example:
+            >>> scene.gravity_start
+            Traceback (most recent call last):
+            ValueError: scene "iss_dg" has no gravity
+        """
+        given = self.gravity
+        if given is None or given.position is None or given.velocity is None:
+            raise ValueError(f'scene "{self.name}" has no gravity')
+        return given.position, given.velocity
 
     @property
     def is_chosen(self) -> bool:
@@ -375,6 +409,7 @@ TABLES: dict[tuple[str, ...], type[Table]] = {
     ("vessels", "*", "points", "*"): Point,
     ("docks", "*"): Dock,
     ("inputs",): Inputs,
+    ("gravity",): Gravity,
     ("rotation",): Rotation,
     ("accuracy",): Accuracy,
     ("experiment",): Experiment,

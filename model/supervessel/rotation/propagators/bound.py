@@ -38,10 +38,3 @@ def longest_step(rate_square: ca.SX, angle: float) -> ca.SX:
     """Returns angle over a rate [s], given by its square: infinite, with derivatives 0, where it is 0."""
     moves = rate_square > 0.0
     return ca.if_else(moves, angle / ca.sqrt(ca.if_else(moves, rate_square, 1.0)), ca.inf)
-
-
-def smooth_length(vector: ca.SX) -> ca.SX:
-    """Returns the length of a vector, with derivative 0, the mean of those to either side, where it is 0."""
-    square = ca.sumsqr(vector)
-    some = square > 0.0
-    return ca.if_else(some, ca.sqrt(ca.if_else(some, square, 1.0)), 0.0)

@@ -95,26 +95,38 @@ THIRD_ORDER: Mapping[int, float] = {0: 0.2440944881889764, 8: 0.7338466882816118
 
 
 def dop853_step(ode: Callable[[ca.SX], ca.SX], state: ca.SX, step: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Returns the state (attitude, angular velocity), (7,), one step later, and the estimated error, (2,).
+    """Returns the state (attitude, angular velocity, and what goes along), (n,), one step later.
 
+    The second result is the estimated error, (2,).
     ode   : state -> its rate
-    state : (7,), attitude of any length near 1; it is at unit length afterwards
+    state : (n,), attitude of any length near 1; it is at unit length afterwards
     step  : [s]
     error : of the attitude [rad] and of the angular velocity [rad/s], in this step
     """
-    rates: list[ca.SX] = []
-    for stage in STAGES:
-        rates.append(ode(state + step * _weighted(rates, stage) if stage else state))
+    rates = _stage_rates(ode, state, step)
     mean = _weighted(rates, WEIGHTS)
     end = state + step * mean
     fifth = step * _weighted(rates, FIFTH_ORDER)
     third = step * (mean - _weighted(rates, THIRD_ORDER))
-    error = ca.vertcat(2.0 * _combined(fifth[:4], third[:4]), _combined(fifth[4:], third[4:]))
+    error = ca.vertcat(2.0 * _combined(fifth[:4], third[:4]), _combined(fifth[4:7], third[4:7]))
     return ca.vertcat(unit(end[:4]), end[4:]), error
 
 
+def runge_kutta_end(ode: Callable[[ca.SX], ca.SX], state: ca.SX, step: ca.SX) -> ca.SX:
+    """Returns any state, (n,), one step later, by the method of order 8; ode : state -> its rate."""
+    return state + step * _weighted(_stage_rates(ode, state, step), WEIGHTS)
+
+
+def _stage_rates(ode: Callable[[ca.SX], ca.SX], state: ca.SX, step: ca.SX) -> list[ca.SX]:
+    """Returns the rates at all stages of a step."""
+    rates: list[ca.SX] = []
+    for stage in STAGES:
+        rates.append(ode(state + step * _weighted(rates, stage) if stage else state))
+    return rates
+
+
 def _weighted(rates: Sequence[ca.SX], weights: Mapping[int, float]) -> ca.SX:
-    return sum((weight * rates[j] for j, weight in weights.items()), ca.SX.zeros(7))
+    return sum((weight * rates[j] for j, weight in weights.items()), ca.SX.zeros(rates[0].numel()))
 
 
 def _combined(fifth: ca.SX, third: ca.SX) -> ca.SX:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import casadi as ca
 
 if TYPE_CHECKING:
+    from supervessel.rotation.gravity import Field
     from supervessel.rotation.laws import RotationLaw
 
 Control = Literal["angle", "error", "series"]
@@ -17,13 +18,15 @@ Free = Literal["never", "always", "between kicks"]
 class StepSymbols:
     """What a step is built from, symbols or expressions of one scene.
 
-    state        : attitude and angular velocity, (7,)
-    rate         : state -> its rate, (7,)
+    state        : attitude and angular velocity, (7,); in a field of gravity then position [m] and velocity
+                   [m/s] from the attracting centre, inertial axes, (13,)
+    rate         : state -> its rate
     law, numbers : the rotation law and its own numbers
-    torque       : (3,) [N m], body axes, constant over the step
+    torque       : (3,) [N m], body axes, constant over the step; gravity's is another
     step         : [s]
     tolerance    : the scene's
     with_error   : whether a method that needs no estimate for itself shall give one
+    field        : the field of gravity, None where there is none
     """
 
     state: ca.SX
@@ -34,18 +37,28 @@ class StepSymbols:
     step: ca.SX
     tolerance: float
     with_error: bool
+    field: "Field | None" = None
 
     @property
     def acceleration_by_torque(self) -> ca.SX:
-        """Angular acceleration by the torque alone, (3,) [rad/s2]."""
+        """Angular acceleration by the constant torque alone, (3,) [rad/s2]."""
         return self.law.acceleration(self.numbers, ca.SX.zeros(3), self.torque)
+
+    @property
+    def acceleration_at_start(self) -> ca.SX:
+        """Angular acceleration by all torques as the step begins, (3,) [rad/s2]."""
+        torque = self.torque
+        if self.field is not None:
+            torque = torque + self.field.torque(self.state[:4], self.state[-6:-3])
+        return self.law.acceleration(self.numbers, ca.SX.zeros(3), torque)
 
 
 @dataclass(frozen=True)
 class Step:
     """One step of a method.
 
-    state    : (7,), after it, the attitude at unit length; of "split" after its first half kick
+    state    : after it, as in `StepSymbols`, the attitude at unit length; of "split" attitude and angular
+               velocity after its first half kick
     error    : estimate of its local error, (2,): attitude [rad], angular velocity [rad/s]; None: not wanted
     exponent : power of the step that the estimate grows with
     """

@@ -9,7 +9,7 @@ from supervessel.rotation.propagators.method import Propagator, Step, StepSymbol
 
 
 def rk4_step(ode: Callable[[ca.SX], ca.SX], state: ca.SX, step: ca.SX) -> ca.SX:
-    """Returns the state (attitude, angular velocity), (7,), one step later, the attitude at unit length.
+    """Returns the state (attitude, and what goes along), (n,), one step later, the attitude at unit length.
 
     ode   : state -> its rate
     step  : [s]
@@ -33,7 +33,7 @@ def build(motion: StepSymbols) -> Step:
     half = 0.5 * motion.step
     better = rk4_step(motion.rate, rk4_step(motion.rate, motion.state, half), half)
     off = (16.0 / 15.0) * (end - better)
-    return Step(end, ca.vertcat(2.0 * ca.norm_2(off[:4]), ca.norm_2(off[4:])), 5)
+    return Step(end, ca.vertcat(2.0 * ca.norm_2(off[:4]), ca.norm_2(off[4:7])), 5)
 
 
 PROPAGATOR = Propagator(

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 
 from supervessel.rotation.attitude import unit
-from supervessel.rotation.laws import RotationLaw
+from supervessel.rotation.propagators.gradient_series import GradientSeries
 from supervessel.rotation.propagators.method import STILL_PARTS, Propagator, Step, StepSymbols
 
 LEAST_ORDER, MOST_ORDER = 6, 20
@@ -30,29 +30,27 @@ def taylor_order(tolerance: float) -> int:
     return min(max(order, LEAST_ORDER), MOST_ORDER)
 
 
-def taylor_step(  # noqa: PLR0913, PLR0917
-    law: RotationLaw, numbers: ca.SX, torque: ca.SX, state: ca.SX, step: ca.SX, order: int
-) -> tuple[ca.SX, ca.SX]:
-    """Returns the state (attitude, angular velocity), (7,), one step later, and the estimated error, (2,).
+def taylor_step(motion: StepSymbols, order: int) -> tuple[ca.SX, ca.SX]:
+    """Returns the state one step later, the attitude at unit length, and the estimated error, (2,).
 
-    law, numbers : the rotation law and its own numbers
-    torque       : (3,) [N m], constant in body axes
-    state        : (7,), attitude of any length near 1; it is at unit length afterwards
-    step         : [s]
-    order        : P, of the highest power kept, at least 4
-    error        : of the attitude [rad] and of the angular velocity [rad/s], in this step; like step^(P + 1)
+    motion : what the step is made of, its attitude of any length near 1
+    order  : P, of the highest power kept, at least 4
+    error  : of the attitude [rad] and of the angular velocity [rad/s], in this step; like step^(P + 1)
 
     Series in s = (time since the start)/step, so that no power of the step occurs. For the rates w and the
     turn since the start p, a quaternion with p_0 = 1,
     (k + 1) w_k+1 = step (acceleration by the coefficients k of the products, and where k = 0 by torque),
     (k + 1) p_k+1 = sum over j of p_j (0, step/2 w_k-j).
+    In a field of gravity the series of `gradient_series` add to the acceleration.
     The terms that hold a coefficient 0, or k, stand by themselves: nothing else waits for the latest ones.
     Source: [JZ].
     """
+    law, numbers, state, step = motion.law, motion.numbers, motion.state, motion.step
     half = 0.5 * step
-    push = step * law.acceleration(numbers, ca.SX.zeros(3), torque)
+    push = step * motion.acceleration_by_torque
     pull = step * law.gyroscopic(numbers)
-    rates = [ca.vertsplit(state[4:])]
+    rates = [ca.vertsplit(state[4:7])]
+    gradient = None if motion.field is None else GradientSeries(motion.field, law, numbers, state, step)
     start = [half * rate for rate in rates[0]]
     turns: list[list[ca.SX]] = []  # from p_1 on
     for k in range(order):
@@ -60,10 +58,15 @@ def taylor_step(  # noqa: PLR0913, PLR0917
         products = ca.vertcat(*(_product(rates, i, j) for i, j in law.products))
         change = (scale * pull) @ products if law.products else ca.SX.zeros(3)
         turns.append([scale * x for x in _turn(turns, rates, step)] if k else [ca.SX(0), *start])
+        if gradient is not None:
+            change = change + scale * gradient.next(rates)
         rates.append(ca.vertsplit(ca.densify(change + push if k == 0 else change)))
     error = ca.vertcat(2.0 * _remainder(turns[-4:]), _remainder(rates[-4:]))
     attitude = state[:4] + _times(state[:4], _sum(turns))
-    return ca.vertcat(unit(attitude), state[4:] + _sum(rates[1:])), error
+    end = ca.vertcat(unit(attitude), state[4:7] + _sum(rates[1:]))
+    if gradient is not None:
+        end = ca.vertcat(end, gradient.end(end[:4]))
+    return end, error
 
 
 def _turn(turns: Coefficients, rates: Coefficients, step: ca.SX) -> list[ca.SX]:
@@ -148,8 +151,7 @@ def _remainder(last: Coefficients) -> ca.SX:
 def build(motion: StepSymbols) -> Step:
     """Returns one step with its estimate, of the order that suits the scene's tolerance."""
     order = taylor_order(motion.tolerance)
-    step = taylor_step(motion.law, motion.numbers, motion.torque, motion.state, motion.step, order)
-    return Step(*step, order + 1)
+    return Step(*taylor_step(motion, order), order + 1)
 
 
 def _suits(law: str, inputs: Mapping[str, Any]) -> str:
