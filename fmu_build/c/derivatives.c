@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "changes.h"
+#include "field.h"
 #include "model.h"
 #include "variables.h"
 
@@ -56,6 +57,7 @@ static Status check_request(Instance *instance, const unsigned unknowns[], size_
     }
     if (status == STATUS_OK) status = instance_check_attitude(instance);
     if (status == STATUS_OK) status = composite_refresh(instance);
+    if (status == STATUS_OK) status = field_check(instance);
     if (status == STATUS_OK) composite_refresh_axes(instance);
     if (status == STATUS_OK) changes_mirror(instance);
     return status;

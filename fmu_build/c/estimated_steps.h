@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "field.h"
 #include "solver.h"
 
 /* From one sub-step to the next the size grows by this factor at most: by it too where the error is less than the share
@@ -34,6 +35,7 @@ static inline double planned_size(const Progress *progress) {
 static inline void go_on(Instance *instance, Progress *progress, const double next[], double size, double error) {
     progress->error += error;
     memcpy(instance_x(instance), next, STATE_COUNT * sizeof(double));
+    field_move(instance);
     progress->remaining = size < progress->remaining ? progress->remaining - size : 0.0;
 }
 

@@ -11,6 +11,13 @@ static Status refuse_action(Instance *instance) {
         const double *v = &instance->now.values[i];
         if (v[0] == 0.0 && v[1] == 0.0 && v[2] == 0.0) continue;
         const Variable *variable = &VARIABLES[i];
+#if FIELD
+        if (i >= REFERENCE_TORQUE + FIELD_PLACE)
+            return instance_refuse(instance,
+                                   "%.*s = (%.10g, %.10g, %.10g) m: gravity's gradient acts there, and the propagator "
+                                   "exact knows free motion alone; take taylor or dop853",
+                                   group_length(variable), variable->name, v[0], v[1], v[2]);
+#endif
         return instance_refuse(instance, "%.*s = (%.10g, %.10g, %.10g) %s: %s", group_length(variable),
                                variable->name, v[0], v[1], v[2], variable->unit, reason);
     }

@@ -14,6 +14,7 @@
 
 #include "changes.h"
 #include "error_bound.h"
+#include "field.h"
 #include "variables.h"
 
 enum { MESSAGE_SIZE = 1024, LONGEST_NAME = 200 };
@@ -250,6 +251,7 @@ Status instance_exit_initialization(Instance *instance) {
     instance_start_rate(instance);
     Status status = instance_start_attitude(instance);
     if (status == STATUS_OK) status = composite_refresh(instance);
+    if (status == STATUS_OK) status = field_check(instance);
     if (status != STATUS_OK) return status;
     changes_start(instance);
     bound_start(instance);

@@ -164,6 +164,11 @@ struct Instance {
     double *res[WORK_RES];
     int iw[WORK_INT];
     double w[WORK_REAL];
+#if FIELD
+    double acting[INPUT_U_COUNT];     /* the inputs u within a communication step, see field.h */
+    double moved[6];                  /* m, m/s: where a sub-step ends, before it is taken */
+    bool moves;                       /* the model is given `acting` */
+#endif
 
     const Call *call;                 /* the FMI function being answered */
     void *environment;                /* the importer's, handed back with each callback */
@@ -242,6 +247,9 @@ static inline void instance_state_moved(Instance *instance) {
 static inline void instance_set_arguments(Instance *instance) {
     instance->arg[0] = instance_x(instance);
     instance->arg[1] = &instance->now.values[REFERENCE_TORQUE];
+#if FIELD
+    if (instance->moves) instance->arg[1] = instance->acting;
+#endif
     instance->arg[2] = instance->now.c;
     instance->arg[3] = instance->now.a;
     instance->arg[4] = instance->now.errors;

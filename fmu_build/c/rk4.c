@@ -3,6 +3,7 @@
    Needs of the model: step (one step and the estimate of its error), fastest_square (a bound of the rate). */
 #include <string.h>
 
+#include "field.h"
 #include "model.h"
 #include "solver.h"
 
@@ -31,6 +32,7 @@ Status solver_sub_step(Instance *instance, Progress *progress) {
     instance->arg[3] = &size;
     instance->res[0] = next;
     instance->res[1] = error;
+    field_result(instance);
     step(instance->arg, instance->res, instance->iw, instance->w, 0);
     if (!is_finite(next))
         return instance_refuse_size(instance,
@@ -40,6 +42,7 @@ Status solver_sub_step(Instance *instance, Progress *progress) {
     progress->taken += 1.0;
     progress->error += error[0] + error[1] * progress->remaining + HALF_ULP;
     memcpy(x, next, sizeof next);
+    field_move(instance);
     progress->remaining = count > 1.0 ? progress->remaining - size : 0.0;
     return STATUS_OK;
 }

@@ -9,6 +9,7 @@
 
 #include "composite.h"
 #include "error_bound.h"
+#include "field.h"
 #include "model.h"
 #include "variables.h"
 
@@ -88,7 +89,9 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
     *ended_early = false;
     Status status = check_times(instance, time, h);
     if (status == STATUS_OK) status = composite_refresh(instance);
+    if (status == STATUS_OK) status = field_check(instance);
     if (status != STATUS_OK) return status;
+    field_begin(instance);
     Progress progress;
     begin(&progress, h);
     double start[STATE_COUNT], end = time + h;
@@ -110,6 +113,7 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
             now->values[REFERENCE_TIME] = start_time;
             memcpy(now->errors, start_errors, sizeof start_errors);
             memcpy(now->bound, start_bound, sizeof start_bound);
+            field_end(instance);
             return status;
         }
         now->values[REFERENCE_TIME] = progress.remaining > 0.0 ? end - progress.remaining : end;
@@ -118,13 +122,17 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
             progress.error + turned_by_rounding(instance, start, now->values[REFERENCE_TIME] - start_time);
         if (!instance->sub_step_ended) continue;
         const double wanted = listen(instance, end);
-        if (now->state == TERMINATED) return STATUS_ERROR;
+        if (now->state == TERMINATED) {
+            field_end(instance);
+            return STATUS_ERROR;
+        }
         if (wanted < end) {
             *ended_early = true;
             end = wanted;
             progress.remaining = end - now->values[REFERENCE_TIME];
         }
     }
+    field_end(instance);
     now->epoch_holds = progress.was_free;
     memcpy(now->stepped_p, now->p, sizeof now->p);
     bound_remember(instance);

@@ -17,6 +17,16 @@ Status tried_step(Instance *instance, double size, double next[], double error[2
     memcpy(kicked, next, sizeof kicked);
     const Status status = free_motion(instance, kicked, size, drifted);
     if (status != STATUS_OK) return status;
+#if FIELD
+    double begun[6], ended[6];
+    memcpy(begun, field_of(instance), sizeof begun);
+    memcpy(ended, instance->moved, sizeof ended);
+    memcpy(field_of(instance), ended, sizeof ended);
     tried_call(instance, drifted, size, next, again);
+    memcpy(field_of(instance), begun, sizeof begun);
+    memcpy(instance->moved, ended, sizeof ended);
+#else
+    tried_call(instance, drifted, size, next, again);
+#endif
     return STATUS_OK;
 }

@@ -64,6 +64,10 @@ Status solver_sub_step(Instance *instance, Progress *progress) {
     const double *x = instance_x(instance), *map = &instance->now.a[AXES_SERIES];
     Series series;
     series.order = progress->exponent - 1;
+#if FIELD
+    series.field = field_of(instance);
+    series.gradient = &instance->now.a[AXES_GRADIENT];
+#endif
     for (;;) {
         const double size = planned_size(progress);
         progress->taken += 1.0;
@@ -93,6 +97,9 @@ Status solver_sub_step(Instance *instance, Progress *progress) {
             const double turned_on = 2.0 * HALF_ULP * speed * progress->remaining; /* adds up as a random walk does */
             const double drift = sqrt(progress->drift * progress->drift + turned_on * turned_on);
             memcpy(progress->rest, rest, sizeof rest);
+#if FIELD
+            taylor_sum_field(&series, map, share, next, instance->moved);
+#endif
             go_on(instance, progress, next, taken, error + HALF_ULP * (1.0 + speed * size) + (drift - progress->drift));
             progress->drift = drift;
             progress->next_size = size * smaller(best, MOST_GROWTH);

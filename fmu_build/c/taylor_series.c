@@ -3,6 +3,10 @@
 
 #include <math.h>
 
+#if FIELD
+#include "gradient_series.h"
+#endif
+
 /* Whether the law has products of rates, and whether their map has axes of its own. */
 enum { GYROSCOPIC = PRODUCT_COUNT > 0, TURNED = PRODUCT_COUNT > 3 };
 
@@ -73,6 +77,42 @@ static void estimate(Series *series) {
     series->error[1] = remainder_of(before[1], after[1]);
 }
 
+#if FIELD
+
+/* Begins the series of position and velocity, and adds the gradient's part to the first change of the rates. */
+static void begin_field(const double x[7], const double map[], double step, Series *series, Gradient *g) {
+    const double *r = series->field, distance = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]), per = 1.0 / distance;
+    double body[3], acceleration[3], scaled[3];
+    for (int half = 0; half < 2; half++) {
+        for (int i = 0; i < 3; i++) scaled[i] = per * r[3 * half + i];
+        into_body(x, scaled, body);
+        from_body(map, body, half ? series->motion[0] : series->place[0]);
+    }
+    series->distance = distance;
+    begin_gradient(g, series->place[0], series->motion[0], distance, step, series->gradient);
+    go_along(g, NULL, 0, series->rates[0], series->rates[0], &g->first, step, series->place[1], series->motion[1],
+             acceleration);
+    for (int i = 0; i < 3; i++) series->rates[1][i] += acceleration[i];
+}
+
+/* From coefficient k of all series: coefficient k + 1 of position and velocity, and what it adds to that of the rates. */
+static void follow_field(int k, double step, Series *series, Gradient *g) {
+    Coefficient c;
+    double sums[LANES], acceleration[3];
+    for (int i = 0; i < 3; i++) {
+        c.x[i] = series->place[k][i];
+        c.y[i] = series->motion[k][i];
+    }
+    add_lanes(g->ones + 1, g->others + (k - 1), k - 1, sums);
+    complete(g, sums, k, &c);
+    go_along(g, sums, k, series->rates[0], series->rates[k], &c, step, series->place[k + 1], series->motion[k + 1],
+             acceleration);
+    for (int i = 0; i < 3; i++) series->rates[k + 1][i] += acceleration[i] / (k + 1);
+    if (k + 1 < series->order) spread_lanes(&c, series->rates[k], k, g->ones[k].of, g->others[k].of);
+}
+
+#endif
+
 void taylor_series(const double x[7], const double acceleration[3], const double map[], double step, Series *series) {
     Row ones[TAYLOR_MOST_ORDER], others[TAYLOR_MOST_ORDER];
     double w[3], push[3];
@@ -93,6 +133,10 @@ void taylor_series(const double x[7], const double acceleration[3], const double
         pull[i] = step * map[i];
         rates[1][i] = pull[i] * (w[(i + 1) % 3] * w[(i + 2) % 3]) + rates[1][i];
     }
+#if FIELD
+    Gradient gradient;
+    begin_field(x, map, step, series, &gradient);
+#endif
     for (int k = 1; k < order; k++) {
         const double *p = turn[k], *v = rates[k], scale = 1.0 / (k + 1);
         double s[WIDTH];
@@ -110,6 +154,9 @@ void taylor_series(const double x[7], const double acceleration[3], const double
             rate[2] = (scale * pull[2]) * (s[7] + (w[0] * v[1] + v[0] * w[1]));
         }
         if (k + 1 < order) spread(p, v, step, ones[k].of, others[k].of);
+#if FIELD
+        follow_field(k, step, series, &gradient);
+#endif
     }
     estimate(series);
 }
@@ -143,3 +190,17 @@ void taylor_sum(const Series *series, const double x[7], const double map[], dou
         next[4 + i] = sum;
     }
 }
+
+#if FIELD
+void taylor_sum_field(const Series *series, const double map[], double share, const double next[7], double field[6]) {
+    const double(*const sums[2])[3] = {series->place, series->motion};
+    for (int half = 0; half < 2; half++) {
+        double total[3] = {0.0}, body[3], inertial[3];
+        for (int k = series->order; k >= 0; k--)
+            for (int i = 0; i < 3; i++) total[i] = total[i] * share + sums[half][k][i];
+        to_body(map, total, body);
+        into_inertial(next, body, inertial);
+        for (int i = 0; i < 3; i++) field[3 * half + i] = series->distance * inertial[i];
+    }
+}
+#endif

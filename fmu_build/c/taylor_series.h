@@ -9,10 +9,19 @@
    turn  : of the turn since x, a quaternion, without its 1
    rates : of the angular velocity [rad/s]
    error : estimate of what the series leave out at s = 1: attitude [rad], angular velocity [rad/s]; like
-           s^(order + 1) */
+           s^(order + 1)
+   In a field of gravity, where field and gradient are set before the series are found:
+   field            : position [m] and velocity [m/s] from the attracting centre at x, inertial axes
+   gradient         : the map of products of the direction to the acceleration, in the axes of the map
+   distance         : |r| at x [m]
+   place, motion    : of position and velocity, in units of the distance */
 typedef struct {
     double turn[TAYLOR_MOST_ORDER + 1][4], rates[TAYLOR_MOST_ORDER + 1][3], error[2];
     int order;
+#if FIELD
+    const double *field, *gradient;
+    double distance, place[TAYLOR_MOST_ORDER + 1][3], motion[TAYLOR_MOST_ORDER + 1][3];
+#endif
 } Series;
 
 /* Finds the series, their order being set, from x (attitude, angular velocity).
@@ -27,5 +36,11 @@ void taylor_series(const double x[7], const double acceleration[3], const double
           nearly steady gain would be rounded to the same side */
 void taylor_sum(const Series *series, const double x[7], const double map[], double share, double next[7],
                 double rest[3]);
+
+#if FIELD
+/* Sums up position [m] and velocity [m/s] from the attracting centre at s = share, inertial axes; next is the state
+   there. */
+void taylor_sum_field(const Series *series, const double map[], double share, const double next[7], double field[6]);
+#endif
 
 #endif

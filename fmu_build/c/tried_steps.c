@@ -12,6 +12,7 @@ void tried_call(Instance *instance, const double x[], double size, double next[]
     instance->arg[3] = &size;
     instance->res[0] = next;
     instance->res[1] = error;
+    field_result(instance);
     step(instance->arg, instance->res, instance->iw, instance->w, 0);
 }
 

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "changes.h"
+#include "field.h"
 #include "model.h"
 
 /* Squares of the attitude's length beyond which it cannot be brought to unit length. */
@@ -87,6 +88,7 @@ static Status prepare(Instance *instance, unsigned wanted) {
     if (status == STATUS_OK && (wanted & FOLLOWS_STATES)) changes_mirror(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_AXES)) composite_refresh_axes(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_OUTPUTS)) status = refresh_outputs(instance);
+    if (status == STATUS_OK && (wanted & FOLLOWS_RATES)) status = field_check(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_RATES)) status = refresh_rates(instance);
     return status;
 }

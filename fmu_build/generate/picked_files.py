@@ -24,12 +24,14 @@ CHANGES = frozenset(
 )
 BOUND = frozenset({"error_bound"})
 STAGES = frozenset({"stages"})
+FIELD = frozenset({"field"})
+FIELD_SERIES = frozenset({"gradient_series"})
 STEPS = frozenset(WHEN_FREE.values()).union(*(method.c_files for method in PROPAGATORS.values()))
 
-PICKED = LOOP | BOOLEANS | CHANGES | BOUND | STAGES | STEPS
+PICKED = LOOP | BOOLEANS | CHANGES | BOUND | STAGES | FIELD | FIELD_SERIES | STEPS
 """Names, without .c and .h, of the files that are not in every FMU, HEADERS excepted."""
 
-HEADERS = frozenset({"changes.h", "error_bound.h", "docks.h", "booleans.h"})
+HEADERS = frozenset({"changes.h", "error_bound.h", "docks.h", "booleans.h", "field.h"})
 """Headers with such names that are in every FMU, because other files include them."""
 
 
@@ -52,6 +54,7 @@ def picked_files(model: Equations, has_loop: bool) -> frozenset[str]:
         | docks
         | bound
         | stages
+        | _for_field(model)
         | (LOOP if has_loop else frozenset())
     )
 
@@ -61,6 +64,13 @@ def has_stages(model: Equations) -> bool:
     scene = model.resolved.scene
     keeps = keeps_in_truth(scene) if model.bound else {} if model.change is None else scene.keeps
     return "momentum" in keeps.values()
+
+
+def _for_field(model: Equations) -> frozenset[str]:
+    """Returns the files that a field of gravity needs, see field.h."""
+    if not model.has_field:
+        return frozenset()
+    return FIELD | (FIELD_SERIES if "taylor_series" in model.plan.c_files else frozenset())
 
 
 def _for_changes(model: Equations) -> frozenset[str]:

@@ -48,6 +48,7 @@ def scene_header(
         **change_constants(model),
         **loop_constants(loop),
         **_bound(model),
+        **_field(model),
         **_plan(model),
         **_limits(model.resolved.scene),
         "INDEX_MARK": f"'{INDEX_MARKS[entries[0].naming]}'",
@@ -168,6 +169,30 @@ def _bound(model: Equations) -> dict[str, object]:
         "ASKED_ATTITUDE": "HUGE_VAL" if asked is None else repr(asked.attitude),
         "ASKED_RATE": "HUGE_VAL" if asked is None or asked.rate is None else repr(asked.rate),
     }
+
+
+def _field(model: Equations) -> dict[str, object]:
+    """Returns macros about a field of gravity.
+
+    FIELD          : 1 if its gradient turns the body; only then there are the others
+    FIELD_PLACE    : place of position and velocity among the inputs u
+    GRAVITY_MU     : [m3/s2]
+    GRADIENT_COUNT : number of products that the acceleration follows from, 3 or 6, for Taylor steps
+    AXES_GRADIENT  : place in a of the map from them to the acceleration
+    """
+    gravity, axes = model.resolved.scene.gravity, model.slices.axes
+    if gravity is None or not model.has_field:
+        return {"FIELD": 0}
+    found: dict[str, object] = {
+        "FIELD": 1,
+        "FIELD_PLACE": len(model.resolved.acting),
+        "GRAVITY_MU": repr(gravity.mu),
+    }
+    if "gradient" in axes:
+        place = axes["gradient"]
+        found["GRADIENT_COUNT"] = 3 if place.stop - place.start == 3 else 6
+        found["AXES_GRADIENT"] = place.start
+    return found
 
 
 def _limits(scene: Scene) -> dict[str, str]:

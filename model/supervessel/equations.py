@@ -115,6 +115,7 @@ class Equations:
     exchange        : functions of model exchange
     change          : how the angular velocity changes with the inputs; None where it never does
     changing        : the functions of `change` that the FMU needs, with derivatives
+    has_field       : whether gravity's gradient turns the body
     """
 
     resolved: ResolvedScene
@@ -132,6 +133,7 @@ class Equations:
     exchange: ExchangeFunctions
     change: Change | None
     changing: tuple[ca.Function, ...]
+    has_field: bool
 
     @cached_property
     def composite_derivatives(self) -> tuple[ca.Function, ca.Function]:
@@ -203,6 +205,7 @@ def equations(scene: Scene) -> Equations:
         exchange=_exchange_functions(states, outputs_from(states.x), (u, c, a, e), axes_change),
         change=change,
         changing=_changing(scene, change),
+        has_field=dynamics.field is not None,
     )
 
 

@@ -16,6 +16,7 @@ from supervessel.rotation.attitude import attitude_dot
 from supervessel.rotation.laws import LAWS
 from supervessel.rotation.propagators import dop853
 from supervessel.rotation.propagators.dop853 import dop853_step
+from supervessel.rotation.propagators.method import StepSymbols
 from supervessel.rotation.propagators.taylor import taylor_order, taylor_step
 from support import Array, U, random_rotation
 from support.series import Number, Vector, flight, mp, norm
@@ -108,7 +109,7 @@ def step(law: str, method: str, order: int = 0) -> Step:
     if method == "dop853":
         results, power = dop853_step(rate, x, h), dop853.ORDER
     else:
-        results, power = taylor_step(rotation, c, u, x, h, order), order + 1
+        results, power = taylor_step(StepSymbols(x, rate, rotation, c, u, h, 1e-9, True), order), order + 1
     J = ca.SX.sym("J", 3, 3)
     return Step(
         ca.Function("step", [x, u, c, h], list(results)),

@@ -34,6 +34,7 @@ from supervessel.rotation.error_bound.remainder import (
 )
 from supervessel.rotation.laws import LAWS
 from supervessel.rotation.propagators import dop853
+from supervessel.rotation.propagators.method import StepSymbols
 from supervessel.rotation.propagators.rk4 import rk4_step
 from supervessel.rotation.propagators.taylor import taylor_step
 from support import EPS
@@ -97,7 +98,7 @@ def bound_function(law: str, method: str = "rk4") -> ca.Function:
     stepped: dict[str, Callable[[], ca.SX]] = {
         "rk4": lambda: rk4_step(rate, x, h),
         "dop853": lambda: dop853.dop853_step(rate, x, h)[0],
-        "taylor": lambda: taylor_step(rules, numbers, M, x, h, 12)[0],
+        "taylor": lambda: taylor_step(StepSymbols(x, rate, rules, numbers, M, h, 1e-9, True), 12)[0],
     }
     motion = motion_bounds(constants, body, x[4:], h)
     residual, lam = largest_residual(constants, body, motion), largest_growth(constants, motion)

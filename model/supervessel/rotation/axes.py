@@ -39,6 +39,8 @@ def axes_graph(resolved: ResolvedScene, plan: Plan, dynamics: Dynamics, products
                 R_body_principal, column by column
     series    : for Taylor steps: the factors (J_j - J_k)/J_i of products of two rates, (3,), principal axes;
                 then, unless body axes are principal axes, R_body_principal, (9,), column by column
+    gradient  : for Taylor steps in a field of gravity: the map of products to the acceleration in the axes of
+                `series`, (3,) or, column by column, (18,), see `Field.gradient_map`
     bound     : (n,), where error_bound is an output: see `rotation.error_bound.constants.stored`
     """
     inertia = dynamics.inertia
@@ -58,10 +60,19 @@ def axes_graph(resolved: ResolvedScene, plan: Plan, dynamics: Dynamics, products
         parts["series"] = ca.vertcat(principal_products(moments), ca.vec(R_body_principal))
     elif in_series:
         parts["series"] = ca.diag(products) if products.numel() else ca.SX(0, 1)
+    if in_series and dynamics.field is not None:
+        parts["gradient"] = -parts["series"][:3] if products.numel() else _gradient_map(dynamics)
     if "error_bound" in resolved.scene.outputs.names:
         parts["bound"] = stored(constants_of(dynamics))
     slices, a = stacked(parts)
     return AxesGraph(a, slices)
+
+
+def _gradient_map(dynamics: Dynamics) -> ca.SX:
+    """Returns the map of products to the acceleration by gravity's gradient, body axes, see `axes_graph`."""
+    assert dynamics.field is not None
+    found = dynamics.field.gradient_map(dynamics.law, dynamics.numbers)
+    return ca.diag(found) if found.size2() == 3 else ca.vec(found)
 
 
 def axes_derivative(inertia: ca.SX, c: ca.SX, a: ca.SX, slices: Mapping[str, slice]) -> GivenDerivative:

@@ -1,7 +1,7 @@
 """Gravity's gradient as a torque, and the motion about the attracting centre, in CasADi symbols.
 
-r is the barycentre's position from the centre [m] and v its velocity [m/s], inertial axes; the centre attracts
-as a mass point does, and the torque is of first order in the body's size over |r|.
+r is the barycentre's position from the centre [m] and v its velocity [m/s], inertial axes; the centre
+attracts as a mass point does, and the torque is of first order in the body's size over |r|.
 Source: [EQ] Gravity's gradient, eqs. (12) and (13).
 """
 

@@ -17,10 +17,11 @@ def linear_model(state: ca.SX, torque: ca.SX, p: ca.SX, acceleration: ca.SX) -> 
     p            : (n,)
     acceleration : omega', (3,) [rad/s2], body axes, an expression of state, torque and p
     phi' = d_omega - omega x phi: `error_state.error_rate` to first order. The block of A from phi to d_omega'
-    is zero: no torque here depends on the attitude.
+    is zero but in a field of gravity, whose torque alone depends on the attitude.
     """
-    omega = state[4:]
-    A = ca.blockcat([[-ca.skew(omega), ca.SX.eye(3)], [ca.SX(3, 3), ca.jacobian(acceleration, state)[:, 4:]]])
+    omega, by_state = state[4:], ca.jacobian(acceleration, state)
+    by_phi = by_state[:, :4] @ tangent(state[:4])
+    A = ca.blockcat([[-ca.skew(omega), ca.SX.eye(3)], [by_phi, by_state[:, 4:]]])
     B = ca.vertcat(ca.SX(3, torque.numel()), ca.jacobian(acceleration, torque))
     E = ca.vertcat(ca.SX(3, p.numel()), ca.jacobian(acceleration, p))
     return ca.densify(A), ca.densify(B), ca.densify(E)

@@ -58,14 +58,16 @@ class Plant:
             scene = scene.model_copy(update={"rotation": rotation})
         self.scene, self.doublings, self.error_form = scene, doublings, error_form
         self._model = equations(scene)
-        inputs = (*self._model.resolved.shaping, *self._model.resolved.contact)
-        start = np.append(p_start(scene), np.zeros(len(self._model.names.k)))
+        resolved = self._model.resolved
+        inputs = (*resolved.shaping, *resolved.contact, *resolved.field)
+        at_start = [variable.start for variable in resolved.field]
+        start = np.concatenate([p_start(scene), np.zeros(len(resolved.contact)), at_start])
         constants = settled(fixed, inputs)
         free = [i for i in range(len(inputs)) if i not in constants]
         self._p_variables = [inputs[i] for i in free]
         self.p_names = tuple(variable.name for variable in self._p_variables)
-        self.u_variables = self._model.resolved.acting
-        self.u_names, self.x_names = self._model.names.u, X_NAMES
+        self.u_variables = resolved.acting
+        self.u_names, self.x_names = tuple(variable.name for variable in resolved.acting), X_NAMES
         self.y_names = tuple(v.name for v in self._model.resolved.outputs if not v.kind.of_step)
         self.p = ca.SX.sym("p", len(free))
         self.u = ca.SX.sym("u", len(self.u_names))
@@ -76,6 +78,10 @@ class Plant:
         symbols = dict(zip(free, ca.vertsplit(self.p) if free else [], strict=True))
         elements = (symbols[i] if i in symbols else ca.SX(constants[i]) for i in range(len(inputs)))
         self._inputs = ca.vertcat(ca.SX(0, 1), *elements)
+        self._place = self._inputs[len(inputs) - len(resolved.field) :]
+        """Position [m] and velocity [m/s] in a field of gravity, (6,), or (0,)."""
+        self._turning_inputs = ca.vertcat(self.u, self._place)
+        """The equations' u: what torques follow from."""
         # CasADi turns x * (1/y) into x/y when the two meet in one graph. The FMU computes 1/y once for each
         # change of inertia, so the twin must multiply by it as well to give the same last bit.
         with simplification(False):
@@ -136,7 +142,7 @@ class Plant:
             (7, 1)
         """
         with simplification(False):
-            rate = self._model.ode(self.x, self.u, self._c)
+            rate = self._model.ode(self.x, self._turning_inputs, self._c)
         return self._function("ode", self._at, {"x_dot": rate}, unit=False)
 
     @cached_property
@@ -151,7 +157,7 @@ class Plant:
             45.02
         """
         with simplification(False):
-            longest = self._model.steps.longest_step(self.x, self.u, self._c)
+            longest = self._model.steps.longest_step(self.x, self._turning_inputs, self._c)
         return self._function("longest_step", self._at, {"h_max": longest}, unit=False)
 
     @cached_property
@@ -167,7 +173,7 @@ class Plant:
             (7, 50)
         """
         with simplification(False):
-            end = self._stepped(self._c, self._a)
+            end, _ = self._stepped(self._place, self._c, self._a)
         return self._function("step", self._at | {"h": self.h}, {"x_next": end})
 
     @cached_property
@@ -180,7 +186,7 @@ class Plant:
             True
         """
         with simplification(False):
-            y = self._model.outputs(self.x, self.u, self._c, self._a, 0.0)
+            y = self._model.outputs(self.x, self._turning_inputs, self._c, self._a, 0.0)
         shown = [i for i, name in enumerate(self._model.names.y) if name in self.y_names]
         return self._function("outputs", self._at, {"y": y[shown]}, unit=False)
 
@@ -203,7 +209,7 @@ class Plant:
         shaping, omega = len(model.names.p), self.x[4:]
         after = ca.substitute(self._inputs, self.p, p_next)
         if model.change is not None:
-            inputs = (omega, self._inputs[:shaping], after[:shaping], after[shaping:])
+            inputs = (omega, self._inputs[:shaping], after[:shaping], self._contact(after))
             with simplification(False):
                 margins = composite_slices()["margins"]
                 omega = followed(model.resolved, model.change, model.composite, margins, inputs)
@@ -234,7 +240,7 @@ class Plant:
         """
         bound = ca.SX.sym("bound", 2)
         parts = {name: self._c[place] for name, place in self._model.slices.composite.items()}
-        end = bound_over_step(self._model, parts, bound, (self.x, self.u, self.h))
+        end = bound_over_step(self._model, parts, bound, (self.x, self._turning_inputs, self.h))
         arguments = {"x": self.x, "bound": bound, "u": self.u, "p": self.p, "h": self.h}
         return self._function("error_bound", arguments, {"bound_next": end})
 
@@ -255,7 +261,7 @@ class Plant:
         p_next, bound = ca.SX.sym("p_next", self.p.numel()), ca.SX.sym("bound", 2)
         shaping = len(self._model.names.p)
         following = ca.substitute(self._inputs, self.p, p_next)
-        inputs = (self._inputs[:shaping], following[:shaping], following[shaping:])
+        inputs = (self._inputs[:shaping], following[:shaping], self._contact(following))
         end = bound_over_change(self._model, self.x[4:], bound, inputs)
         arguments = {"x": self.x, "bound": bound, "p": self.p, "p_next": p_next}
         return self._function("error_bound_change", arguments, {"bound_next": end})
@@ -275,23 +281,29 @@ class Plant:
         """
         if not isinstance(count, int) or count < 1:
             raise ValueError(f"rollout: {count!r} steps: must be a whole number from 1")
-        x, u = ca.MX.sym("x", 7), ca.MX.sym("u", self.u.numel(), count)
+        x, u = ca.MX.sym("x", self.x.numel()), ca.MX.sym("u", self.u.numel(), count)
         p, h = ca.MX.sym("p", self.p.numel()), ca.MX.sym("h")
         always_free = self._model.plan.method is None
         more = (count - 1).bit_length() if always_free else 0
         c, a = (ca.SX.sym(name, part.numel()) for name, part in (("c", self._c), ("a", self._a)))
+        place = ca.SX.sym("place", self._place.numel())
         with simplification(False):
-            end = self._stepped(c, a, more)
+            end = ca.vertcat(*self._stepped(place, c, a, more))
         numbers = ca.vertcat(c, a)
         used = [i for i, needed in enumerate(ca.which_depends(end, numbers, 1, False)) if needed]
-        step = ca.Function("step_of_composite", [self.x, self.u, numbers[used], self.h], [end])
+        state = ca.vertcat(self.x, place)
+        step = ca.Function("step_of_composite", [state, self.u, numbers[used], self.h], [end])
         composite = ca.Function("numbers", [self.p], [ca.densify(ca.vertcat(self._c, self._a)[used])])
         known = ca.repmat(composite(p), 1, count)
+        begun = ca.vertcat(x, ca.Function("place", [self.p], [self._place])(p))
         if always_free:
             so_far = ca.cumsum(ca.fabs(u), 1) if self.u_names else u
-            states = step.map(count)(ca.repmat(x, 1, count), so_far, known, h * ca.DM(range(1, count + 1)).T)
+            states = step.map(count)(
+                ca.repmat(begun, 1, count), so_far, known, h * ca.DM(range(1, count + 1)).T
+            )
         else:
-            states = step.mapaccum(count)(x, u, known, ca.repmat(h, 1, count))
+            states = step.mapaccum(count)(begun, u, known, ca.repmat(h, 1, count))
+        states = states[: self.x.numel(), :]
         return self._checked(ca.Function("rollout", [x, u, p, h], [states], ["x", "u", "p", "h"], ["x_next"]))
 
     @property
@@ -309,10 +321,17 @@ class Plant:
         defaults |= {"p": self.p_start, "p_next": self.p_start}
         return TwinFunction(function, defaults, unit)
 
-    def _stepped(self, c: ca.SX, a: ca.SX, more: int = 0) -> ca.SX:
-        """Returns the state after h by the scene's method, (7,), an expression of x, u, h, c and a.
+    def _contact(self, inputs: ca.SX) -> ca.SX:
+        """Returns the motion at contact, k, of all inputs that the twin's p stands for."""
+        first = len(self._model.names.p)
+        return inputs[first : first + len(self._model.names.k)]
 
-        more : doublings of free motion, beyond the twin's own
+    def _stepped(self, place: ca.SX, c: ca.SX, a: ca.SX, more: int = 0) -> tuple[ca.SX, ca.SX]:
+        """Returns state, (7,), and place in the field after h by the scene's method.
+
+        place : position [m] and velocity [m/s] in a field of gravity, (6,), or (0,)
+        c, a  : the composite and its axes
+        more  : doublings of free motion, beyond the twin's own
         """
         model = self._model
 
@@ -321,15 +340,19 @@ class Plant:
             end = free_step(x, axes[:3], ca.reshape(axes[3:], 3, 3), self.h, self.doublings + more)
             return end + _zero_without_derivative_at_equal(axes[:3])
 
-        def stepped(x: ca.SX) -> ca.SX:
-            return model.steps.step.call([x, self.u, c, self.h])[0]
+        def stepped(x: ca.SX, place: ca.SX) -> tuple[ca.SX, ca.SX]:
+            results = model.steps.step.call([x, ca.vertcat(self.u, place), c, self.h])
+            return results[0], results[2] if model.has_field else place
 
         if model.plan.method is None:
             pushed = ca.norm_1(self.u) > 0.0 if self.u_names else ca.SX(0.0)
-            return free(self.x) + ca.if_else(pushed, ca.SX.nan(), 0.0)
+            if model.has_field:
+                pushed = ca.SX(1.0)
+            return free(self.x) + ca.if_else(pushed, ca.SX.nan(), 0.0), place
+        kicked, moved = stepped(self.x, place)
         if model.plan.free == "between kicks":
-            return stepped(free(stepped(self.x)))
-        return stepped(self.x)
+            return stepped(free(kicked), moved)[0], moved
+        return kicked, moved
 
 
 def _zero_without_derivative_at_equal(moments: ca.SX) -> ca.SX:

@@ -16,6 +16,7 @@ from supervessel.equations import composite_slices
 from supervessel.fmu import communication_step, generate
 from supervessel.problems import unknown
 from supervessel.rotation.attitude import to_inertial, unit
+from supervessel.rotation.gravity import Field, field_of
 from supervessel.rotation.laws import LAWS
 from supervessel.rotation.principal import principal
 from supervessel.twin.conventions import acados_model, do_mpc_model
@@ -157,7 +158,7 @@ class Twin(Plant):
         """
         x_ref, e, a_ref = (ca.SX.sym(*s) for s in (("x_ref", 7), ("e", 6), ("acceleration_ref", 3)))
         x = ca.vertcat(retracted(x_ref, e, self.error_form)[:4], x_ref[4:] + e[3:])
-        acceleration = self._model.ode(x, self.u, self._c)[4:]
+        acceleration = self._model.ode(x, self._turning_inputs, self._c)[4:]
         e_dot = error_rate(e, x_ref[4:], acceleration, a_ref, self.error_form)
         args = {"e": e, "u": self.u, "p": self.p, "x_ref": x_ref, "acceleration_ref": a_ref}
         return self._function("error_ode", args, {"e_dot": e_dot})
@@ -175,7 +176,7 @@ class Twin(Plant):
             >>> A.shape, B.shape, E.shape
             ((6, 6), (6, 3), (6, 10))
         """
-        acceleration = self._model.ode(self.x, self.u, self._c)[4:]
+        acceleration = self._model.ode(self.x, self._turning_inputs, self._c)[4:]
         model = linear_model(self.x, self.u, self.p, acceleration)
         return self._function("linearise", self._at, dict(zip("ABE", model, strict=True)))
 
@@ -191,15 +192,17 @@ class Twin(Plant):
             >>> round(float(A[0, 3]), 6)
             0.1
         """
-        model = discrete_model(self.x, self.u, self.p, self._stepped(self._c, self._a))
+        end, _ = self._stepped(self._place, self._c, self._a)
+        model = discrete_model(self.x, self.u, self.p, end)
         return self._function("discretise", self._at | {"h": self.h}, dict(zip("ABE", model, strict=True)))
 
     @cached_property
     def trim(self) -> TwinFunction:
         """x, p -> u, (m,), whose torque keeps the angular velocity of x constant; its forces are zero.
 
-        The torque is omega x (J omega + h), (3,) [N m], body axes, h the momentum of moving ports: a relative
-        equilibrium. Without h it is zero for spins about `principal` axes.
+        The torque is omega x (J omega + h), (3,) [N m], body axes, h the momentum of moving ports, less that
+        of gravity's gradient: a relative equilibrium. Without h and gravity it is zero for spins about
+        `principal` axes.
 
         Example:
             >>> u = twin.trim(twin.x_start, twin.p_start)
@@ -209,6 +212,8 @@ class Twin(Plant):
         self.check_torque("trim")
         omega = self.x[4:]
         torque = ca.cross(omega, self._turning @ omega + self._spin)
+        if self._field is not None:
+            torque = torque - self._field.torque(self.x[:4], self._place[:3])
         u = ca.vertcat(torque, ca.SX.zeros(len(self.u_names) - 3))
         return self._function("trim", {"x": self.x, "p": self.p}, {"u": u})
 
@@ -232,6 +237,8 @@ class Twin(Plant):
     @cached_property
     def invariants(self) -> TwinFunction:
         """x, p -> kinetic_energy [J], angular_momentum (3,) [N m s], inertial axes: constant without torque.
+
+        Gravity's gradient is a torque: along an orbit neither is constant.
 
         Both are formed with the law's tensor, as in `principal`: "decoupled" and "none" keep the angular
         velocity itself, and the unit tensor stands for J.
@@ -284,6 +291,12 @@ class Twin(Plant):
         """h, (3,) [N m s], body axes, of moving parts; zero where the law has no gyroscopic term."""
         known = "momentum" in self._model.slices.composite and LAWS[self.scene.rotation.law].gyroscopic_term
         return self._c[self._model.slices.composite["momentum"]][:3] if known else ca.SX.zeros(3)
+
+    @cached_property
+    def _field(self) -> Field | None:
+        """The field of gravity, of the twin's own expressions."""
+        parts = {name: self._c[place] for name, place in self._model.slices.composite.items()}
+        return field_of(self._model.resolved, parts, self._turning_inputs)
 
     @cached_property
     def _turning(self) -> ca.SX:
@@ -348,12 +361,17 @@ class Twin(Plant):
         compiled = communication_step(self.scene, Path(folder))
         sizes = {name: self.step.size1_in(name) for name in self.step.name_in()}
         at = {name: ca.MX.sym(name, size) for name, size in sizes.items()}
-        columns = [ca.repmat(at[name], 1, sub_steps) for name in ("u", "p")]
-        end = self.step.fold(sub_steps)(at["x"], *columns, ca.repmat(at["h"] / sub_steps, 1, sub_steps))
+        held, size = ca.repmat(at["u"], 1, sub_steps), at["h"] / sub_steps
+        if self._model.has_field:
+            end = self.rollout(sub_steps)(at["x"], held, at["p"], size)[:, -1]
+        else:
+            columns = (held, ca.repmat(at["p"], 1, sub_steps), ca.repmat(size, 1, sub_steps))
+            end = self.step.fold(sub_steps)(at["x"], *columns)
         blocks = [ca.jacobian(end, known) for known in at.values()]
         jacobian = ca.Function(f"jac_{compiled.name()}", [*at.values(), ca.MX.sym("x_next", 7)], blocks)
         inputs = ca.Function("inputs", [self.p], [self._inputs])(at["p"])
-        x_next = compiled(at["x"], at["u"], inputs, at["h"])
+        first = len(self._model.names.p) + len(self._model.names.k)  # of the place in a field of gravity
+        x_next = compiled(at["x"], ca.vertcat(at["u"], inputs[first:]), inputs[:first], at["h"])
         options: Any = {"custom_jacobian": jacobian, "enable_forward": False, "enable_reverse": False}
         step = ca.Function(compiled.name(), [*at.values()], [x_next], [*at], ["x_next"], options)
         return self._checked(step)

@@ -20,7 +20,8 @@ class GradientSeries:
     R^T v = d y, d = |r| at the start. With q = x . x, the square of the distance, and m = mu/d^3,
     x' = y - omega x x, y' = -m q^(-3/2) x - omega x y,
     and the acceleration is 3 m q^(-5/2) times a linear map of the products of two components of x.
-    Powers of q by q (q^a)' = a q' q^a: k q_0 (q^a)_k = sum over j from 1 to k of (a j - (k - j)) q_j (q^a)_k-j.
+    Powers of q by q (q^a)' = a q' q^a, so that
+    k q_0 (q^a)_k = sum over j from 1 to k of (a j - (k - j)) q_j (q^a)_k-j.
     Source: [EQ] Gravity's gradient, eqs. (12) to (14); [JZ] for the series of a power.
     """
 
