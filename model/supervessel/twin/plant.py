@@ -76,9 +76,9 @@ class Plant:
         self.p_start = start[free]
         """The scene's values of p, (n,)."""
         symbols = dict(zip(free, ca.vertsplit(self.p) if free else [], strict=True))
-        elements = (symbols[i] if i in symbols else ca.SX(constants[i]) for i in range(len(inputs)))
+        elements = [symbols[i] if i in symbols else ca.SX(constants[i]) for i in range(len(inputs))]
         self._inputs = ca.vertcat(ca.SX(0, 1), *elements)
-        self._place = self._inputs[len(inputs) - len(resolved.field) :]
+        self._place = ca.vertcat(ca.SX(0, 1), *elements[len(inputs) - len(resolved.field) :])
         """Position [m] and velocity [m/s] in a field of gravity, (6,), or (0,)."""
         self._turning_inputs = ca.vertcat(self.u, self._place)
         """The equations' u: what torques follow from."""
