@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from supervessel.composite.docks import TooManyWaysError
 from supervessel.composite.resolved import resolve
 from supervessel.composite.start import composite_at_start, principal_moments
+from supervessel.orbit import orbit_problem
 from supervessel.problems import SceneError, few_suggestions, key_path, quantity, unknown
 from supervessel.scene.consistency import consistency_problems
 from supervessel.scene.names import misnamed_courses, naming_problems, size_problems
@@ -77,7 +78,8 @@ def parse_scene(raw: Mapping[str, Any], source: str = "scene") -> Scene:
     problems += naming_problems(raw) + consistency_problems(raw)
     if scene is None or problems:
         raise SceneError(source, problems)
-    problems += _range_problems(scene) + _course_problems(scene) + _composite_problems(scene)
+    problems += _range_problems(scene) + _course_problems(scene) + _orbit_problems(scene)
+    problems += _composite_problems(scene)
     if problems:
         raise SceneError(source, problems)
     return scene
@@ -133,6 +135,15 @@ def _course_problems(scene: Scene) -> list[str]:
                 found = quantity(value, variable.unit)
                 problems.append(f'experiment.inputs."{name}": {found} at {time} s: {allowed}')
     return problems
+
+
+def _orbit_problems(scene: Scene) -> list[str]:
+    """Returns why [experiment.orbit] is no orbit about the centre."""
+    orbit = scene.experiment.orbit if scene.experiment else None
+    if orbit is None or scene.gravity is None:
+        return []
+    reason = orbit_problem(orbit.position, orbit.velocity, scene.gravity.mu)
+    return [f"experiment.orbit.{reason}"] if reason else []
 
 
 def _composite_problems(scene: Scene) -> list[str]:

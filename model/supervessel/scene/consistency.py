@@ -10,7 +10,7 @@ from typing import Any
 
 from supervessel.problems import listed, printable, quantity, toml_key
 from supervessel.rotation.propagators import PROPAGATORS
-from supervessel.scene.inputs import by_group
+from supervessel.scene.inputs import by_group, by_name
 from supervessel.scene.numbers import Vector, is_number, triangle_problem, vector_length
 from supervessel.scene.schema import (
     CHOSEN,
@@ -161,17 +161,28 @@ def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:
 
 def _gravity(raw: Mapping[str, Any]) -> Iterator[str]:
     """Yields why [gravity] and inputs.gravity do not go together, or from where the flight starts."""
-    inputs, gravity = raw.get("inputs", {}), raw.get("gravity")
+    inputs, gravity, experiment = (raw.get(key, {}) for key in ("inputs", "gravity", "experiment"))
     asked = isinstance(inputs, Mapping) and inputs.get("gravity") is True
-    if asked and gravity is None:
+    orbit = experiment.get("orbit") if isinstance(experiment, Mapping) else None
+    if asked and "gravity" not in raw:
         yield "gravity.mu: missing; inputs.gravity = true needs the centre's gravitational parameter [m3/s2]"
-    if not isinstance(gravity, Mapping):
+    for place, given in (("gravity", raw.get("gravity")), ("experiment.orbit", orbit)):
+        if given is not None and not asked:
+            yield f"{place}: without effect; put gravity = true under [inputs]"
+    for key in ("position", "velocity") if isinstance(gravity, Mapping) and "gravity" in raw else ():
+        if orbit is not None and key in gravity:
+            yield f"gravity.{key}: given beside [experiment.orbit], where the flight starts; leave it out"
+        elif orbit is None and key not in gravity:
+            needs = "the inputs gravity.position and gravity.velocity start from it"
+            yield f"gravity.{key}: missing, and no [experiment.orbit]; {needs}"
+    if asked and "accuracy" in raw and orbit is None:
+        yield "experiment.orbit: missing; [accuracy] flies along it where inputs.gravity is true"
+    courses = experiment.get("inputs") if isinstance(experiment, Mapping) else None
+    if orbit is None or not isinstance(courses, Mapping):
         return
-    if not asked:
-        yield "gravity: without effect; put gravity = true under [inputs]"
-    for key in ("position", "velocity"):
-        if key not in gravity:
-            yield f"gravity.{key}: missing; the inputs gravity.position and gravity.velocity start from it"
+    for name, kind in by_name(inputs).items() if isinstance(inputs, Mapping) else ():
+        if kind.part == "field" and name in courses:
+            yield f'experiment.inputs."{name}": given beside [experiment.orbit], which moves it; leave it out'
 
 
 def _total_mass(raw: Mapping[str, Any]) -> Iterator[str]:

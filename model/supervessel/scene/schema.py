@@ -184,6 +184,7 @@ class Gravity(Table):
     mu       : gravitational parameter [m3/s2]
     position : of the barycentre from the centre [m], inertial axes, at the start
     velocity : of the barycentre relative to the centre [m/s], inertial axes, at the start
+    Where `[experiment.orbit]` has both they are not given here.
     """
 
     mu: Mu
@@ -214,9 +215,21 @@ class Rotation(Table):
     attitude: Attitude = (1.0, 0.0, 0.0, 0.0)
 
 
+class Orbit(Table):
+    """Two-body motion about the centre in `[gravity]`, from position and velocity at time 0 of an experiment.
+
+    position : of the barycentre from the centre [m], inertial axes
+    velocity : of the barycentre relative to the centre [m/s], inertial axes
+    """
+
+    position: Position
+    velocity: Velocity
+
+
 class Experiment(Table):
     """The default experiment: duration [s], communication step [s]; what `supervessel trade` flies.
 
+    orbit  : what the inputs of gravity follow from; None: they do as any other input
     inputs : by the name of an input, rows of time [s] and value. Between rows the value is linear, before the
              first and after the last row it is held, and where two rows have the same time it jumps; a dock's
              values are true and false. Inputs that are not named keep the scene's values.
@@ -224,6 +237,7 @@ class Experiment(Table):
 
     duration: Seconds
     step: Seconds
+    orbit: Orbit | None = None
     inputs: dict[str, Course] = Field(default_factory=dict)
 
 
@@ -326,7 +340,7 @@ class Scene(Table):
             Traceback (most recent call last):
             ValueError: scene "iss_dg" has no gravity
         """
-        given = self.gravity
+        given = self.experiment.orbit if self.experiment and self.experiment.orbit else self.gravity
         if given is None or given.position is None or given.velocity is None:
             raise ValueError(f'scene "{self.name}" has no gravity')
         return given.position, given.velocity
@@ -413,6 +427,7 @@ TABLES: dict[tuple[str, ...], type[Table]] = {
     ("rotation",): Rotation,
     ("accuracy",): Accuracy,
     ("experiment",): Experiment,
+    ("experiment", "orbit"): Orbit,
     ("outputs",): Outputs,
 }
 """Which table stands at which place of a scene file; "*" is a name or a number."""
