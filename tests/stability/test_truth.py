@@ -9,6 +9,7 @@ import pytest
 
 from stability import truth
 from stability.truth import Case, Problem, Vector, mp
+from support.extrapolation import midpoint_rule
 from support.numbers import hamilton
 
 KEPT = mp.mpf(10) ** (
@@ -51,11 +52,7 @@ def gaps(case: Case, turn: Vector, omega: Vector) -> tuple[Any, Any]:
 
 
 def extrapolated(case: Case, columns: int) -> tuple[Vector, Vector]:
-    """Returns the turn and the rate by Gragg's midpoint rule with 2, 4, 6 ... steps, extrapolated to none.
-
-    The span is divided into parts of about a radian.
-    Source: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I, section II.9.
-    """
+    """Returns the turn and the rate by the extrapolated midpoint rule, in parts of about a radian."""
     inertia, omega, torque, time = inputs(case)
     inverse = mp.inverse(mp.matrix(inertia)).tolist()
 
@@ -65,22 +62,9 @@ def extrapolated(case: Case, columns: int) -> tuple[Vector, Vector]:
         change = truth._apply(inverse, [m - g for m, g in zip(torque, gyro, strict=True)])
         return [*(y / 2 for y in hamilton(q, [mp.zero, *w])), *change]
 
-    state, parts = [mp.one, mp.zero, mp.zero, mp.zero, *omega], int(np.ceil(turned_at_most(case)))
-    with mp.workdps(60):
-        for _ in range(parts):
-            rows: list[list[Vector]] = []
-            for j in range(1, columns + 1):
-                h = time / parts / (2 * j)
-                before, now = state, [x + h * y for x, y in zip(state, ode(state), strict=True)]
-                for _ in range(2 * j - 1):
-                    before, now = now, [x + 2 * h * y for x, y in zip(before, ode(now), strict=True)]
-                row = [now]
-                for k in range(1, j):
-                    ratio = mp.mpf(j) ** 2 / mp.mpf(j - k) ** 2 - 1
-                    row.append([a + (a - b) / ratio for a, b in zip(row[-1], rows[-1][k - 1], strict=True)])
-                rows.append(row)
-            state = rows[-1][-1]
-    return state[:4], state[4:]
+    start, parts = [mp.one, mp.zero, mp.zero, mp.zero, *omega], int(np.ceil(turned_at_most(case)))
+    end = midpoint_rule(ode, start, time, parts, columns)
+    return end[:4], end[4:]
 
 
 # The file

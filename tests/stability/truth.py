@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from support.numbers import cross as _cross
 from support.numbers import hamilton as _hamilton
 from support.series import Matrix, Number, Vector, mp, taylor
 from support.series import apply as _apply
@@ -149,10 +150,6 @@ def _read() -> tuple[Case, ...]:
 
 
 # Vectors and quaternions (scalar first, Hamilton product)
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def _transposed(matrix: Matrix) -> Matrix:

@@ -53,3 +53,8 @@ def hamilton(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
         a[0] * b[2] + a[2] * b[0] + a[3] * b[1] - a[1] * b[3],
         a[0] * b[3] + a[3] * b[0] + a[1] * b[2] - a[2] * b[1],
     ]
+
+
+def cross(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
+    """Returns a x b of numbers of any kind."""
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]

@@ -21,26 +21,26 @@ from supervessel.reference.assembly import (
     poses,
     sample_points,
 )
+from supervessel.reference.attitude import attitude_dot, quaternion, rotation_matrix
 from supervessel.reference.changes import at_contact, change
+from supervessel.reference.gravity import gravity_torque, orbit_dot
+from supervessel.reference.laws import angular_acceleration, law_tensor
 from supervessel.reference.rotation import (
-    angular_acceleration,
     angular_momentum,
     angular_velocity,
-    attitude_dot,
     external_torque,
-    law_tensor,
     momentum_ode,
     net_force,
     ode,
-    quaternion,
-    rotation_matrix,
     vessel_outputs,
 )
+from supervessel.reference.wheels import Wheels
 
 __all__ = [
     "Composite",
     "Motion",
     "Points",
+    "Wheels",
     "angular_acceleration",
     "angular_momentum",
     "angular_velocity",
@@ -50,6 +50,7 @@ __all__ = [
     "closed_docks",
     "composite",
     "external_torque",
+    "gravity_torque",
     "internal_momentum",
     "joined",
     "law_tensor",
@@ -57,6 +58,7 @@ __all__ = [
     "motions",
     "net_force",
     "ode",
+    "orbit_dot",
     "points",
     "port_axes",
     "poses",

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from supervessel.reference.assembly import Array, Points, composite, joined, motions, points, vector
-from supervessel.reference.rotation import angular_momentum, law_tensor
+from supervessel.reference.laws import law_tensor
+from supervessel.reference.rotation import angular_momentum
 from supervessel.scene.schema import ORIGIN, Scene
 
 MASS_INPUTS = ("mass", "pmi")

@@ -1,4 +1,4 @@
-"""How the body turns: what acts on it, rotation laws, rates of its state; how its vessels turn with it."""
+"""How the body of a scene turns: what acts on it, rates of its state; how its vessels turn with it."""
 
 from collections.abc import Mapping
 
@@ -14,100 +14,10 @@ from supervessel.reference.assembly import (
     points,
     vector,
 )
+from supervessel.reference.attitude import attitude_dot, quaternion, rotation_matrix
+from supervessel.reference.laws import angular_acceleration, law_tensor
 from supervessel.scene.outputs import VESSEL_OUTPUTS
 from supervessel.scene.schema import ORIGIN, Scene
-
-
-def rotation_matrix(attitude: ArrayLike) -> Array:
-    """Returns R_inertial_body, (3, 3), of the unit quaternion `attitude`, (4,), scalar first.
-
-    Example:
-        >>> (reference.rotation_matrix([0, 0, 0, 1]) @ [1, 2, 3]).tolist()
-        [-1.0, -2.0, 3.0]
-    """
-    w, x, y, z = np.asarray(attitude, dtype=float)
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    rotation: Array = np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
-    return rotation
-
-
-def attitude_dot(attitude: ArrayLike, angular_velocity: ArrayLike) -> Array:
-    """Returns the rate of the attitude quaternion, (4,) [1/s]: half the product q * (0, omega).
-
-    attitude         : (4,), unit, scalar first, body to inertial
-    angular_velocity : (3,) [rad/s], body axes
-
-    Example:
-        >>> reference.attitude_dot([1, 0, 0, 0], [0.2, 0, 0]).tolist()
-        [0.0, 0.1, 0.0, 0.0]
-    """
-    q, omega = np.asarray(attitude, dtype=float), np.asarray(angular_velocity, dtype=float)
-    return 0.5 * np.concatenate([[-q[1:] @ omega], q[0] * omega + np.cross(q[1:], omega)])
-
-
-def quaternion(rotation: ArrayLike) -> Array:
-    """Returns the unit quaternion, (4,), scalar first and not negative, of a rotation matrix, (3, 3).
-
-    The inverse of `rotation_matrix`: w, x, y, z times each other are linear in the matrix's elements, and the
-    quaternion is the axis that the matrix of these products has.
-
-    Example:
-        >>> quarter_turn = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]  # about the third axis
-        >>> reference.quaternion(quarter_turn)[[0, 3]].round(6).tolist()
-        [0.707107, 0.707107]
-    """
-    R = np.asarray(rotation, dtype=float)
-    twist = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    products = np.empty((4, 4))
-    products[0, 0], products[0, 1:], products[1:, 0] = np.trace(R), twist, twist
-    products[1:, 1:] = R + R.T - np.trace(R) * np.eye(3)
-    axis: Array = np.linalg.eigh(products)[1][:, 3]
-    return axis if axis[0] >= 0.0 else -axis
-
-
-def law_tensor(law: str, inertia: ArrayLike) -> Array:
-    """Returns the part of an inertia tensor that a rotation law uses, (3, 3): all of it or its diagonal.
-
-    Example:
-        >>> reference.law_tensor("principal", [[2, 1, 0], [1, 3, 0], [0, 0, 4]]).tolist()
-        [[2.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 4.0]]
-    """
-    J = np.asarray(inertia, dtype=float)
-    return np.diag(np.diag(J)) if law in ("principal", "decoupled") else J
-
-
-def angular_acceleration(
-    law: str,
-    inertia: ArrayLike,
-    angular_velocity: ArrayLike,
-    torque: ArrayLike,
-    internal_momentum: ArrayLike = ORIGIN,
-) -> Array:
-    """Returns the angular acceleration, (3,) [rad/s2], body axes, under a rotation law.
-
-    law               : "none", "decoupled", "principal" or "tensor"
-    inertia           : (3, 3) [kg m2], about the barycentre, body axes
-    angular_velocity  : (3,) [rad/s], body axes
-    torque            : (3,) [N m], about the barycentre, body axes
-    internal_momentum : (3,) [N m s], about the barycentre, body axes, of parts that move at steady rates
-    Source: [CV] eq. (1) for "tensor", eq. (2) for "principal"; "decoupled" leaves out the gyroscopic
-    term, "none" keeps the angular velocity.
-
-    Example:
-        >>> reference.angular_acceleration("tensor", np.diag([1, 2, 4]), [1, 2, 0.5], [0, 0, 0]).tolist()
-        [-2.0, 0.75, -0.5]
-    """
-    J = law_tensor(law, inertia)
-    omega, torque = np.asarray(angular_velocity, dtype=float), np.asarray(torque, dtype=float)
-    if law == "none":
-        return np.zeros(3)
-    if law == "decoupled":
-        return torque / np.diag(J)
-    if law not in ("principal", "tensor"):
-        raise ValueError(f'law = "{law}": must be one of none, decoupled, principal, tensor')
-    momentum = J @ omega + np.asarray(internal_momentum, dtype=float)
-    acceleration: Array = np.linalg.solve(J, torque - np.cross(omega, momentum))
-    return acceleration
 
 
 def external_torque(scene: Scene, values: Mapping[str, float] | None = None) -> Array:
