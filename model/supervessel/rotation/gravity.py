@@ -2,7 +2,7 @@
 
 r is the barycentre's position from the centre [m] and v its velocity [m/s], inertial axes; the centre
 attracts as a mass point does, and the torque is of first order in the body's size over |r|.
-Source: [EQ] Gravity's gradient, eqs. (12) and (13).
+Source: [EQ] Gravity's gradient, eqs. (13) and (14).
 """
 
 from collections.abc import Mapping

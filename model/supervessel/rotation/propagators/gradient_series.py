@@ -22,7 +22,7 @@ class GradientSeries:
     and the acceleration is 3 m q^(-5/2) times a linear map of the products of two components of x.
     Powers of q by q (q^a)' = a q' q^a, so that
     k q_0 (q^a)_k = sum over j from 1 to k of (a j - (k - j)) q_j (q^a)_k-j.
-    Source: [EQ] Gravity's gradient, eqs. (12) to (14); [JZ] for the series of a power.
+    Source: [EQ] Gravity's gradient, eq. (15); [JZ] for the series of a power.
     """
 
     def __init__(self, field: Field, law: RotationLaw, numbers: ca.SX, state: ca.SX, step: ca.SX) -> None:
