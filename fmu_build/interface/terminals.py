@@ -79,7 +79,7 @@ CONNECTIONS: dict[str, Connection | None] = {
     "docked": Connection("dock", "whether {ports} are docked, motion at contact"),
     "force": Connection("force", "external force at {owner}, axes of its vessel"),
     "vessel_torque": Connection("torque", "external torque on {owner}, its axes", "{owner}.torque"),
-    "gravity": Connection("orbit", "position and velocity from the attracting centre, inertial axes", "gravity"),
+    "gravity": Connection("orbit", "place and velocity from the attracting centre, inertial axes", "gravity"),
     "torque": Connection("torque", "external torque about the barycentre, body axes", "torque"),
 }
 """By key of `[inputs]`, the form of the inputs' terminal; None: no terminal. Inputs of any other key have a

@@ -1,14 +1,13 @@
 """FMUs in a field of gravity: beside a motion of 30 digits and beside the twin; places that are refused."""
 
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from supervessel import Twin
-from support import OK, Instance, flying, refusal, scene, variant
+from support import DISCARD, ERROR, OK, Instance, flying, refusal, scene
 from support.gyrostat import Course, Gyrostat, GyrostatState
 from support.orbits import EARTH, ORBIT
 
@@ -16,8 +15,8 @@ TENSOR = [[1.28e8, -2.1e6, 5.3e6], [-2.1e6, 1.07e8, 1.4e6], [5.3e6, 1.4e6, 2.01e
 RATE, ATTITUDE = [1.1e-4, -1.2e-3, 2.3e-4], [0.5, -0.5, 0.5, 0.5]
 DURATION, STEP = 3600.0, 600.0
 GROWTH = 20.0
-"""More than errors grow by until the end, from the end of a step at which they are estimated: an attitude's at
-most by 8.3; a rate's turns the body by 6600 s of it, and its step's estimate counts 600 s."""
+"""More than errors grow by to the end, from the end of the step at which they are estimated: an attitude's at
+most by 8.3; a rate's turns the body by 6600 s of it, of which its step's estimate counts 600 s."""
 SMALL = GROWTH * 6 * 1e-15
 """[rad] of six steps, whose errors are controlled to 1e-15 each."""
 LAWS = ("tensor", "principal", "decoupled")
@@ -56,7 +55,7 @@ def off(x: np.ndarray, law: str, time: float) -> float:
 
 
 def flown(raw: dict[str, Any], law: str, step: float, fmi: int = 3) -> tuple[np.ndarray, float]:
-    """Returns attitude and rate, (7,), at the end, places set every `step` [s], and the sum of error estimates."""
+    """Returns attitude and rate, (7,), at the end, places set every `step` [s]; and the sum of estimates."""
     estimates = 0.0
     with flying(raw, fmi) as instance:
         for k in range(round(DURATION / step)):
@@ -106,9 +105,9 @@ def test_the_twin_steps_as_the_fmu_does(propagator, fmi, tmp_path):
 
 def test_a_rollout_carries_the_place_on():
     twin = Twin(scene(orbiting("taylor")))
-    states = np.array(twin.rollout(6)(x=twin.x_start, h=STEP)["x_next"])
-    for k in range(6):
-        assert off(states[:, k], "tensor", (k + 1) * STEP) < SMALL
+    states = np.array(twin.rollout(30)(x=twin.x_start, h=60.0)["x_next"])
+    for k in (0, 9, 29):
+        assert off(states[:, k], "tensor", (k + 1) * 60.0) < SMALL
 
 
 def test_exact_discards_what_gravity_does():
@@ -144,7 +143,8 @@ def test_places_without_a_meaning_are_refused_and_the_state_is_kept(fmi, name, v
     status = instance.set({name: value})
     if status == OK:
         status = instance.get_status("der(state.angular_velocity[1])") if exchange else instance.step(1.0)
-    assert status == refusal(fmi)
+    unanswered = fmi == 2 and not exchange and np.all(np.isfinite(value))
+    assert status == (ERROR if unanswered else DISCARD)
     assert message in instance.messages()[-1]
     assert instance.set(good) == OK
     for each, numbers in before.items():
