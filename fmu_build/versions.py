@@ -39,8 +39,7 @@ VERSIONS: dict[int, Version] = {
         terminals="3.0",
         platform_tuples=False,
         refusal="The answer is Discard where FMI 2.0 allows it and it helps (a set, a step that is too long; "
-        "in model exchange a get and the derivatives too), else Error; either way a good value can be set, "
-        "and the same call works.",
+        "in model exchange a get and the derivatives too), else Error.",
     ),
     3: Version(
         "3.0",

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from fmu_build.document.accuracy_text import accuracy_text
 from fmu_build.document.rotation_text import energy_and_momentum, law_equation, law_text, what_changes_keep
 from fmu_build.document.tables import Cell, number_text, rounded, table
+from fmu_build.interface.model_description import role_attributes
 from fmu_build.interface.names import Naming
 from fmu_build.interface.variable_table import Role, TableEntry
 from fmu_build.versions import VERSIONS
@@ -42,9 +43,8 @@ ROLE_TITLES: dict[Role, tuple[str, str]] = {
     "time": ("Independent variable", ""),
     "input": (
         "Inputs",
-        "In co-simulation they hold over a communication step. In model exchange they are continuous, but "
-        "for docks, the motion at contact, and what is called discrete where the page says what changes "
-        "keep: these change in event mode alone.",
+        "In co-simulation they hold over a communication step. In model exchange those that are continuous "
+        "may change at any time, those that are discrete in event mode alone.",
     ),
     "parameter": ("Parameters", "Fixed once initialisation ends."),
     "output": (
@@ -199,7 +199,7 @@ def _composite(whole: Mapping[str, NDArray[np.float64]]) -> str:
 def _variables(entries: Sequence[TableEntry]) -> str:
     """Returns a table of variables for each role."""
     text, traced = "", ("scene and twin",) if entries[0].naming == "flat" else ()
-    head = ("reference", "name", "unit", "start", "range", "description", *traced)
+    head = ("reference", "name", "variability", "unit", "start", "range", "description", *traced)
     for role, (title, remark) in ROLE_TITLES.items():
         rows: list[tuple[Cell, ...]] = [_variable(entry) for entry in entries if entry.role == role]
         if rows:
@@ -213,4 +213,6 @@ def _variable(entry: TableEntry) -> tuple[Cell, ...]:
     bounds = ((variable.low, "≥"), (variable.high, "≤"))
     span = ", ".join(f"{sign} {number_text(bound)}" for bound, sign in bounds if bound is not None)
     traced = (variable.name,) if entry.naming == "flat" else ()
-    return entry.reference, entry.name, variable.unit, start, span, variable.description, *traced
+    variability = role_attributes(entry)["variability"]
+    words = (variable.unit, start, span, variable.description, *traced)
+    return entry.reference, entry.name, variability, *words

@@ -123,7 +123,7 @@ def _variables3(root: ET.Element, entries: Sequence[TableEntry]) -> None:
     """Writes the variables; a derivative names its state by value reference."""
     variables = ET.SubElement(root, "ModelVariables")
     for entry in entries:
-        attributes = _identity(entry) | _role(entry)
+        attributes = _identity(entry) | role_attributes(entry)
         if entry.role == "output":
             attributes["intermediateUpdate"] = "true"
         if entry.role == "derivative":
@@ -176,7 +176,7 @@ def _variables2(root: ET.Element, entries: Sequence[TableEntry]) -> None:
     """Writes the variables; a derivative names its state by index."""
     variables = ET.SubElement(root, "ModelVariables")
     for entry in entries:
-        element = ET.SubElement(variables, "ScalarVariable", _identity(entry) | _role(entry))
+        element = ET.SubElement(variables, "ScalarVariable", _identity(entry) | role_attributes(entry))
         attributes = _type_attributes(entry)
         if entry.role == "derivative":
             attributes["derivative"] = str(_state_of(entry, entries).reference + 1)
@@ -254,7 +254,7 @@ def _identity(entry: TableEntry) -> dict[str, str]:
     }
 
 
-def _role(entry: TableEntry) -> dict[str, str]:
+def role_attributes(entry: TableEntry) -> dict[str, str]:
     """Returns causality, variability and initial of a variable."""
     return ROLES[entry.role] | ({"variability": "discrete"} if entry.variable.discrete else {})
 

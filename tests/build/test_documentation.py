@@ -66,7 +66,7 @@ def rows(html):
     """Returns the cells of each row of the page's tables, by the text of the first or second cell."""
     page = etree.fromstring(html)
     found = [["".join(cell.itertext()) for cell in row] for row in page.iter("tr")]
-    return {cells[0]: cells for cells in found} | {cells[1]: cells for cells in found if len(cells) == 6}
+    return {cells[0]: cells for cells in found} | {cells[1]: cells for cells in found if len(cells) == 7}
 
 
 class Balance(HTMLParser):
@@ -136,11 +136,24 @@ def test_the_page_lists_every_variable_with_unit_start_and_range(name):
     table = rows(files[INDEX])
     for entry in entries:
         variable = entry.variable
-        reference, _, unit, start, span, description = table[variable.name]
+        reference, _, _, unit, start, span, description = table[variable.name]
         assert (int(reference), unit, description) == (entry.reference, variable.unit, variable.description)
         assert (float(start) if start else None) == variable.start
         bounds = [bound for bound in (variable.low, variable.high) if bound is not None]
         assert [float(bound) for bound in re.findall(r"[-+.\de]+", span)] == bounds
+
+
+def test_the_page_says_which_inputs_change_in_event_mode_alone():
+    """By default masses keep the rate and poses the momentum, so that poses are discrete."""
+    table = rows(made("iss")[2][INDEX])
+    said = {
+        "DG.mass": "continuous",
+        "DG.nose.position[1]": "discrete",
+        "torque[1]": "continuous",
+        "attitude_start[1]": "fixed",
+        "attitude[1]": "continuous",
+    }
+    assert {name: table[name][2] for name in said} == said
 
 
 def test_the_page_gives_the_composite_that_the_reference_finds():

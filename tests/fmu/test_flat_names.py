@@ -141,7 +141,7 @@ def test_terminals_name_the_fmus_variables_and_keep_the_names_of_their_members(f
 def test_the_page_has_the_fmus_names_and_beside_them_those_of_scene_and_twin(fmi):
     page = etree.fromstring(archive(fmi)["documentation/index.html"])
     rows = {
-        cells[1]: cells for row in page.iter("tr") if len(cells := ["".join(c.itertext()) for c in row]) == 7
+        cells[1]: cells for row in page.iter("tr") if len(cells := ["".join(c.itertext()) for c in row]) == 8
     }
     for structured, flat in zip(names_of(fmi, "structured"), names_of(fmi, "flat"), strict=True):
         assert rows[flat][-1] == structured
