@@ -57,6 +57,14 @@ FUNCTION_PREFIX = """\
 
 """
 
+PLAIN_NAMES = {
+    "name": "FMI3_OVERRIDE_FUNCTION_PREFIX",
+    "value": "1",
+    "optional": "true",
+    "description": "for a shared library: FMI's functions have their plain names",
+}
+"""A definition of buildDescription.xml: who links FMUs into a program leaves it out."""
+
 CASADI_NAME = re.compile(r"^#define (casadi_\w+) CASADI_PREFIX\((\w+)\)$", re.MULTILINE)
 """A name in generated C that stands for another one, model_..."""
 
@@ -135,6 +143,7 @@ def _build_description(model_identifier: str, names: Iterable[str]) -> str:
         file_set = ET.SubElement(configuration, "SourceFileSet", language="C99")
         for name in names:
             ET.SubElement(file_set, "SourceFile", name=name)
+        ET.SubElement(file_set, "PreprocessorDefinition", PLAIN_NAMES)
         ET.SubElement(file_set, "IncludeDirectory", name=".")
         if platform:
             configuration.set("platform", platform)

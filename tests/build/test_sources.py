@@ -12,6 +12,7 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
+from fmpy.build import build_platform_binary
 from fmpy.model_description import read_build_description, read_model_description
 from lxml import etree
 
@@ -206,7 +207,8 @@ def test_build_description_says_how_to_compile_for_each_platform():
         assert file_set.get("language") == "C99"
         assert [f.get("name") for f in file_set.findall("SourceFile")] == source_file_names(GENERATED, 3)
         assert [d.get("name") for d in file_set.findall("IncludeDirectory")] == ["."]
-        assert not file_set.findall("PreprocessorDefinition")
+        (plain,) = file_set.findall("PreprocessorDefinition")
+        assert (plain.get("name"), plain.get("optional")) == ("FMI3_OVERRIDE_FUNCTION_PREFIX", "true")
         libraries = [(lib.get("name"), lib.get("external")) for lib in configuration.findall("Library")]
         assert libraries == ([("m", "true")] if configuration.get("platform") else [])
 
@@ -335,8 +337,23 @@ def test_the_sources_of_fmus_of_both_versions_are_linked_into_one_program_and_fl
 
 
 @FMI
+def test_fmpy_compiles_the_sources_to_a_library_that_it_flies(tmp_path, fmi):
+    """As `fmpy compile` does: FMPy passes what buildDescription.xml lists, and nothing else on Linux."""
+    if shutil.which("cmake") is None:
+        pytest.skip("cmake is not installed (Debian package cmake)")
+    fmpy.extract(str(built(ISS_DG, fmi)), unzipdir=str(tmp_path))
+    expected, library = flight(tmp_path), next(tmp_path.glob("binaries/*/*"))
+    library.unlink()
+    build = tmp_path / "build"
+    build.mkdir()
+    build_platform_binary(tmp_path, build, cmake_options={"CMAKE_C_FLAGS_RELEASE:STRING": "-O0"})
+    assert library.is_file()
+    assert flight(tmp_path).tobytes() == expected.tobytes()
+
+
+@FMI
 def test_a_shared_library_made_of_the_sources_has_the_plain_names(tmp_path, fmi):
-    """The macro is that of the standard's headers (FMI 2.0.4: 2.1.1), which FMPy, too, defines to compile."""
+    """The macro is that of the standard's headers (FMI 2.0.4: 2.1.1)."""
     fmpy.extract(str(built(ISS_DG, fmi)), unzipdir=str(tmp_path))
     headers, library = standard_headers(tmp_path), tmp_path / "plain.so"
     options = ["-O0", f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX", "-shared", "-o", str(library), "-lm"]
