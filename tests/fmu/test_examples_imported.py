@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from fmpy import simulate_fmu
 from fmpy.model_description import read_model_description
+from scipy.integrate import solve_ivp
 
 from changes.histories import start_values
 from supervessel import Scene, Twin, reference
@@ -115,6 +116,54 @@ def test_fmpy_flies_the_examples_with_every_input_moving(fmi, name):
     # CVode, FMPy's default, goes past the instants at which FMPy sets inputs, and fails where they jump far.
     rows = courses(name, fmi, 1e-3)
     assert relative_error(by_fmpy(name, fmi, rows), by_reference(name, rows)) <= 0.05
+
+
+RISE = 20.0
+"""s, in which the servicer's torques rise to 5, 10 and 15 N m."""
+
+
+def risen(kind: str, interval: float, *, every_row_twice: bool = False, **settings: Any) -> float:
+    """Returns how far off FMPy's attitude is after the rise, as a share of the angle turned."""
+    count = round(RISE / interval) if every_row_twice else 1
+    rows = [(t, *(t / RISE * np.array([5.0, 10.0, 15.0]))) for t in np.linspace(0.0, RISE, count + 1)]
+    rows = [row for row in rows for _ in range(1 + every_row_twice)]
+    names = [f"attitude[{i}]" for i in range(1, 5)]
+    result = simulate_fmu(
+        folder("servicer", 3),
+        fmi_type=kind,
+        stop_time=RISE,
+        output_interval=interval,
+        input=np.array(rows, [("time", float), *((known, float) for known in twin("servicer").u_names)]),
+        output=names,
+        **settings,
+    )
+    right = risen_by_scipy()
+    return float(np.linalg.norm([result[name][-1] for name in names] - right) / np.arccos(abs(right[0])))
+
+
+@cache
+def risen_by_scipy() -> Array:
+    t = twin("servicer")
+    solution = solve_ivp(
+        lambda time, x: t.ode(x, time / RISE * np.array([5.0, 10.0, 15.0]), t.p_start).full().ravel(),
+        (0.0, RISE),
+        t.x_start,
+        method="DOP853",
+        rtol=1e-10,
+        atol=1e-12,
+    )
+    attitude: Array = solution.y[:4, -1]
+    return attitude
+
+
+@pytest.mark.parametrize(("interval", "share"), [(0.1, 0.01), (0.01, 0.001)])
+def test_fmpy_flies_a_ramp_as_well_as_co_simulation_where_every_row_is_an_event(interval, share):
+    """The figures are the FMU's page's. CVode, FMPy's default, else holds inputs over its own long steps."""
+    held = risen("CoSimulation", interval)
+    events = risen("ModelExchange", interval, every_row_twice=True, relative_tolerance=1e-8)
+    assert 0.5 * share < held < share
+    assert events < share
+    assert 0.05 < risen("ModelExchange", interval) < 0.07
 
 
 @cache

@@ -268,3 +268,17 @@ def test_an_integrator_on_the_imported_function_flies_as_the_twin_does(fmi):
     # The same integrator takes the same steps, but for roundings that its error control may amplify to its
     # tolerance.
     assert relative_error(ends[0], ends[1]) <= tolerance
+
+
+@FMI
+def test_two_weights_at_once_go_backwards_through_an_integrator(fmi):
+    """Without the option CasADi 3.8.2 stops here: index out of bounds."""
+    name, tolerance = "mass and torque", 1e-10
+    x, u = symbols(name)
+    dae = {"x": x, "p": u, "ode": rate_alone(name, fmi)(x, u)}
+    flight = ca.integrator("flight", "cvodes", dae, 0.0, 10.0, {"reltol": tolerance, "abstol": tolerance})
+    end, weights = flight(x0=x, p=u)["xf"], np.random.default_rng(SEED).normal(size=(7, 2))
+    results = [ca.jtimes(end, u, ca.DM(weights), True), ca.jacobian(end, u)]
+    backwards, jacobian = ca.Function("both", [x, u], results)(*point_values(name, "drawn"))
+    # Two integrations, each to the tolerance in each of some hundred steps, of sensitivities that grow.
+    assert relative_error(backwards.full(), jacobian.full().T @ weights) <= 1e4 * tolerance
