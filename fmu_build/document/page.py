@@ -209,7 +209,9 @@ def _variables(entries: Sequence[TableEntry]) -> str:
 
 def _variable(entry: TableEntry) -> tuple[Cell, ...]:
     variable = entry.variable
-    start = "" if variable.start is None else variable.start
+    start: Cell = "" if variable.start is None else variable.start
+    if variable.boolean:
+        start = "true" if variable.start else "false"
     bounds = ((variable.low, "≥"), (variable.high, "≤"))
     span = ", ".join(f"{sign} {number_text(bound)}" for bound, sign in bounds if bound is not None)
     traced = (variable.name,) if entry.naming == "flat" else ()

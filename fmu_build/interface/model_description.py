@@ -89,7 +89,7 @@ def _header(scene: Scene, fmi: Version, token: str, naming: Naming) -> ET.Elemen
 def _description(scene: Scene) -> str:
     """Returns a line that says which vessels turn, and by which law."""
     others = [name for name in scene.vessels if name != scene.root]
-    how = "docked, now and then" if scene.inputs.docked else "docked"
+    how = "docked (docks open and close)" if scene.inputs.docked else "docked"
     docked = (
         f" with {', '.join(others[:8])}{' and others' if len(others) > 8 else ''} {how}" if others else ""
     )

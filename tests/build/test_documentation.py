@@ -51,6 +51,13 @@ SCENES = {
     "single": body(),
     "nothing_in": variant(body(), {"inputs": {}, "outputs": {"names": ["mass"]}}),
     "hostile_names": HOSTILE_NAMES,
+    "docks": variant(
+        ISS_DG,
+        {
+            "docks": [{"ports": ["ISS.P2", "DG.nose"], "name": "berth"}],
+            "inputs": {"docked": ["berth"], "mass": ["DG"]},
+        },
+    ),
 }
 
 
@@ -138,22 +145,24 @@ def test_the_page_lists_every_variable_with_unit_start_and_range(name):
         variable = entry.variable
         reference, _, _, unit, start, span, description = table[variable.name]
         assert (int(reference), unit, description) == (entry.reference, variable.unit, variable.description)
-        assert (float(start) if start else None) == variable.start
+        assert (float({"true": "1", "false": "0"}.get(start, start)) if start else None) == variable.start
         bounds = [bound for bound in (variable.low, variable.high) if bound is not None]
         assert [float(bound) for bound in re.findall(r"[-+.\de]+", span)] == bounds
 
 
-def test_the_page_says_which_inputs_change_in_event_mode_alone():
+@pytest.mark.parametrize(
+    ("name", "discrete"), [("iss", ["DG.nose.position[1]"]), ("docks", ["berth.docked", "berth.velocity[1]"])]
+)
+def test_the_page_says_which_inputs_change_in_event_mode_alone(name, discrete):
     """By default masses keep the rate and poses the momentum, so that poses are discrete."""
-    table = rows(made("iss")[2][INDEX])
-    said = {
-        "DG.mass": "continuous",
-        "DG.nose.position[1]": "discrete",
-        "torque[1]": "continuous",
-        "attitude_start[1]": "fixed",
-        "attitude[1]": "continuous",
-    }
-    assert {name: table[name][2] for name in said} == said
+    table = rows(made(name)[2][INDEX])
+    said = {"DG.mass": "continuous", "attitude_start[1]": "fixed", "attitude[1]": "continuous"}
+    said |= dict.fromkeys(discrete, "discrete")
+    assert {variable: table[variable][2] for variable in said} == said
+
+
+def test_the_page_has_the_start_of_a_dock_in_words():
+    assert rows(made("docks")[2][INDEX])["berth.docked"][4] == "true"
 
 
 def test_the_page_gives_the_composite_that_the_reference_finds():
