@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from supervessel import Twin
-from support import DISCARD, ERROR, OK, Instance, flying, refusal, scene
+from support import DISCARD, EPS, ERROR, OK, Instance, flying, refusal, scene
 from support.gyrostat import Course, Gyrostat, GyrostatState
 from support.orbits import EARTH, ORBIT
 
@@ -152,3 +152,37 @@ def test_places_without_a_meaning_are_refused_and_the_state_is_kept(fmi, name, v
     if not exchange:
         assert instance.step(1.0) == OK
     instance.free()
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_rates_and_their_derivatives_in_model_exchange_are_the_twins(law):
+    raw = orbiting("taylor", law)
+    twin, u = Twin(scene(raw)), np.array([3.0, -2.0, 5.0])
+    instance = Instance(raw, exchange=True)
+    assert instance.initialise(torque=u) == OK
+    rates = [f"der({name})" for name in twin.x_names]
+    x_dot = twin.ode(twin.x_start, u, twin.p_start).full().ravel()
+    assert [instance.get(name) for name in rates] == x_dot.tolist()
+    blocks = twin.ode.jacobian()(twin.x_start, u, twin.p_start, x_dot)
+    knowns = [*twin.x_names, *twin.u_names, *twin.p_names]
+    jacobian = np.hstack([np.array(block) for block in blocks])
+    forward = np.array([instance.directional(rates, knowns, unit) for unit in np.eye(len(knowns))]).T
+    adjoint = np.array([instance.adjoint(rates, knowns, row) for row in np.eye(7)])
+    size = np.linalg.norm(jacobian, axis=0) + 1e-300
+    np.testing.assert_allclose(forward / size, jacobian / size, rtol=0, atol=16 * EPS)
+    np.testing.assert_allclose(adjoint / size, jacobian / size, rtol=0, atol=16 * EPS)
+    assert np.all(forward[:, knowns.index("gravity.velocity[1]") :][:, :3] == 0.0)
+    instance.free()
+
+
+def test_derivatives_of_a_step_by_the_place_are_those_of_differences():
+    twin = Twin(scene(orbiting("dop853")))
+    x, p = twin.x_start, twin.p_start
+    jacobian = np.array(twin.step.jacobian()(x, np.zeros(3), p, 60.0, np.zeros(7))[2])
+    for i in range(6):
+        small = np.zeros(6)
+        small[i] = 1e-4 * np.linalg.norm(p[3 * (i // 3) : 3 * (i // 3) + 3])
+        ends = [np.array(twin.step(x, np.zeros(3), p + side * small, 60.0)).ravel() for side in (1.0, -1.0)]
+        difference = (ends[0] - ends[1]) / (2.0 * small[i])
+        scale = np.abs(jacobian[:, 3 * (i // 3) : 3 * (i // 3) + 3]).max()
+        np.testing.assert_allclose(difference / scale, jacobian[:, i] / scale, rtol=0, atol=1e-6)
