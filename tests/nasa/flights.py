@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from nasa.facts import Row, brick_inertia, brick_rates, brick_simulators, station, table
+from nasa.facts import Row, brick_inertia, brick_rates, brick_simulators, cylinder, station, table
 from support import OK, Array, Instance, hamilton
 from support.gyrostat import Course, Gyrostat, GyrostatState
 from support.series import flight, mp, norm
@@ -143,3 +143,50 @@ def brick_flight(
             states.append(state(it))
     it.free()
     return worst(states, list(brick_truth(times)))
+
+
+# The cylinder in its orbit
+
+
+@cache
+def cylinder_truth() -> Course:
+    """Returns the true course of the cylinder."""
+    facts, rows = table("cylinder"), cylinder()
+    start = GyrostatState(rows[0].attitude, rows[0].rates, rows[0].orbit[:3], rows[0].orbit[3:])
+    return Course(Gyrostat(facts["inertia"], mu=facts["mu"]), start, rows[-1].time)
+
+
+def cylinder_scene(propagator: str, **rotation: Any) -> dict[str, Any]:
+    """Returns the raw scene of the cylinder."""
+    facts, start = table("cylinder"), cylinder()[0]
+    gravity = {"mu": facts["mu"], "position": list(start.orbit[:3]), "velocity": list(start.orbit[3:])}
+    raw = raw_scene(
+        "cylinder", facts["inertia"], start, propagator, gravity=gravity, inputs={"gravity": True}
+    )
+    raw["rotation"] |= rotation
+    return raw
+
+
+@cache
+def cylinder_flight(propagator: str, step: float, **rotation: Any) -> tuple[Row, ...]:
+    """Returns the FMU's states at the published times; the true orbit is set every `step` [s]."""
+    it, states = Instance(cylinder_scene(propagator, **rotation), optimised=False), []
+    times = {row.time for row in cylinder()}
+    assert it.initialise() == OK, it.log
+    states.append(state(it))
+    orbit = cylinder_truth().orbit(step * np.arange(round(cylinder()[-1].time / step)))
+    for _ in in_orbit(it, step, orbit.tolist()):
+        if it.time in times:
+            states.append(state(it))
+    it.free()
+    return tuple(states)
+
+
+def in_orbit(it: Instance, step: float, orbit: Iterable[Sequence[float]]) -> Iterator[None]:
+    """Steps an instance, position and velocity set before each step; yields after each."""
+    place = [it.references[name] for name in it.names("gravity.position") + it.names("gravity.velocity")]
+    for count, values in enumerate(orbit, start=1):
+        it.fmu.setFloat64(place, values)
+        it.fmu.doStep(it.time, step)
+        it.time = count * step
+        yield
