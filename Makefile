@@ -95,6 +95,7 @@ peers: .venv-peers/installed
 	PYTHONPATH=tests .venv-peers/bin/python tests/peers/peers.py
 	PYTHONPATH=tests:tests/bench .venv-peers/bin/python tests/peers/work.py
 	PYTHONPATH=tests:tests/bench .venv-peers/bin/python tests/peers/composites.py
+	PYTHONPATH=tests:tests/bench .venv-peers/bin/python tests/peers/orbit.py
 
 # Flies all cells whatever the first ones do, writes the table, then fails if one of them did.
 importers: .venv-importers/installed
@@ -130,7 +131,7 @@ clean:
 	$(PYTHON) -m venv .venv-peers
 	.venv-peers/bin/python -m pip install --quiet --upgrade 'pip>=25.1'
 	.venv-peers/bin/python -m pip install --quiet --editable . scipy mpmath
-	@for p in mujoco drake bsk pin pythonfmu; do .venv-peers/bin/python -m pip install --quiet $$p || \
+	@for p in mujoco drake bsk pin pythonfmu heyoka; do .venv-peers/bin/python -m pip install --quiet $$p || \
 	  echo "$$p cannot be installed here: skipped"; done
 	touch $@
 

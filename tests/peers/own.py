@@ -1,7 +1,7 @@
 """This project's ways to fly the work of fliers.py, from native code, through FMPy, and by the twin."""
 
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -63,14 +63,26 @@ def built(folder: Path, propagator: str, angle: float = 0.05) -> Built:
 def native(host: Path, fmu: Built, work: Work, tolerance: float) -> tuple[float, list[float]] | None:
     """Returns plain RK4 steps of a flight and the attitude at its end; None if the FMU discards a step."""
     torque = [w for pair in zip(fmu.references("torque"), work.torque, strict=True) for w in pair]
-    shown = fmu.references(*SHOWN)
-    words = [work.span, work.spans, tolerance, 3, *torque, len(shown), *shown]
+    found = flown(host, fmu, (work.span, work.spans, tolerance), torque, SHOWN)
+    return None if found is None else (found[0], found[1][:4])
+
+
+def flown(
+    host: Path, fmu: Built, steps: tuple[float, int, float], given: Sequence[Any], shown: Sequence[str]
+) -> tuple[float, list[float]] | None:
+    """Returns plain RK4 steps of a flight and outputs at its end; None if the FMU discards a step.
+
+    steps : size of a step [s], number of steps, tolerance
+    given : references and values of inputs, in turn
+    """
+    got = fmu.references(*shown)
+    words = [*steps, len(given) // 2, *given, len(got), *got]
     command = [host, fmu.library, fmu.description.guid, *words]
     done = subprocess.run([str(w) for w in command], check=True, capture_output=True, text=True)
     if done.stdout.startswith("discarded"):
         return None
     _, ratio, *values = map(float, done.stdout.split())
-    return ratio, values[:4]
+    return ratio, values
 
 
 def through_fmpy(folder: Path, propagator: str) -> Callable[[Work], Settings]:

@@ -30,6 +30,7 @@ NAMES = {
     "mujoco": "MuJoCo",
     "drake": "Drake",
     "bsk": "Basilisk",
+    "heyoka": "heyoka",
     "pin": "Pinocchio",
     "casadi": "CasADi",
     "pythonfmu": "pythonfmu",
