@@ -15,6 +15,7 @@ from supervessel.reference.assembly import (
     vector,
 )
 from supervessel.reference.attitude import attitude_dot, quaternion, rotation_matrix
+from supervessel.reference.gravity import gravity_torque
 from supervessel.reference.laws import angular_acceleration, law_tensor
 from supervessel.scene.outputs import VESSEL_OUTPUTS
 from supervessel.scene.schema import ORIGIN, Scene
@@ -23,7 +24,8 @@ from supervessel.scene.schema import ORIGIN, Scene
 def external_torque(scene: Scene, values: Mapping[str, float] | None = None) -> Array:
     """Returns the torque on what is joined to the root, (3,) [N m], about its barycentre, body axes.
 
-    The torque input, the moments of forces at their points, and torques on vessels.
+    The torque input, the moments of forces at their points, and torques on vessels; without that of gravity's
+    gradient, which depends on the attitude: `gradient_torque`.
 
     Example:
         >>> reference.external_torque(scene, {"torque[3]": 100.0}).tolist()
@@ -37,6 +39,23 @@ def external_torque(scene: Scene, values: Mapping[str, float] | None = None) -> 
             force = motion.rotation @ vector(f"{vessel}.{point}.force", ORIGIN, values)
             torque = torque + np.cross(position - barycentre, force)
     return torque
+
+
+def gradient_torque(scene: Scene, attitude: ArrayLike, values: Mapping[str, float] | None = None) -> Array:
+    """Returns the torque of gravity's gradient by the law's tensor, (3,) [N m], body axes; 0 without gravity.
+
+    attitude : (4,), unit, scalar first, body to inertial
+    The inputs' position counts, their velocity does not: the torque is that of one instant.
+
+    Example:
+        >>> reference.gradient_torque(scene, [1, 0, 0, 0]).tolist()
+        [0.0, 0.0, 0.0]
+    """
+    if scene.gravity is None:
+        return np.zeros(3)
+    position = vector("gravity.position", scene.gravity_start[0], values)
+    inertia = law_tensor(scene.rotation.law, composite(scene, values).inertia)
+    return gravity_torque(inertia, attitude, position, scene.gravity.mu)
 
 
 def net_force(scene: Scene, values: Mapping[str, float] | None = None) -> Array:
@@ -61,7 +80,8 @@ def ode(
 ) -> Array:
     """Returns the rate of the state (attitude, angular velocity), (7,), of a scene under its own law.
 
-    torque : (3,) [N m], all that acts from outside, about the barycentre; by default what `values` say
+    torque : (3,) [N m], all that acts from outside, about the barycentre; by default what `values` say and
+             gravity's gradient
     Inputs are steady: between changes.
 
     Example:
@@ -73,7 +93,9 @@ def ode(
         scene.rotation.law,
         composite(scene, values).inertia,
         state[4:],
-        external_torque(scene, values) if torque is None else torque,
+        external_torque(scene, values) + gradient_torque(scene, state[:4], values)
+        if torque is None
+        else torque,
         internal_momentum(scene, values),
     )
     return np.concatenate([attitude_dot(state[:4], state[4:]), acceleration])
@@ -120,7 +142,7 @@ def momentum_ode(scene: Scene, state: ArrayLike, values: Mapping[str, float] | N
     """
     state = np.asarray(state, dtype=float)
     omega = angular_velocity(scene, state[4:], values)
-    momentum_dot = external_torque(scene, values)
+    momentum_dot = external_torque(scene, values) + gradient_torque(scene, state[:4], values)
     if scene.rotation.law != "decoupled":
         momentum_dot = momentum_dot - np.cross(omega, state[4:])
     return np.concatenate([attitude_dot(state[:4], omega), momentum_dot])
