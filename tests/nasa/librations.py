@@ -1,7 +1,7 @@
 """A body that librates on a circular orbit: its motion by the FMU, its frequencies and its invariant."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,25 +13,23 @@ from support import OK, Array, Instance
 MU = 3.986004418e14  # m3/s2
 RADIUS = 6.786e6  # m
 RATE = math.sqrt(MU / RADIUS**3)  # rad/s
-STEPS = 96  # of a revolution
-STEP = 2.0 * math.pi / RATE / STEPS  # s
+PERIOD = 2.0 * math.pi / RATE  # s
 
 ALONG = (1000.0, 1800.0, 2200.0)
 """Moments [kg m2] about the radius, the direction of flight and the orbit's normal, the body's axes in the
 the stable attitude."""
 
 
-def orbit() -> Array:
-    """Returns position and velocity, (STEPS, 6), of a revolution in the plane of the first two axes."""
-    angle = 2.0 * np.pi * np.arange(STEPS) / STEPS
-    c, s, zero = np.cos(angle), np.sin(angle), np.zeros(STEPS)
+def orbit(angle: Array) -> Array:
+    """Returns position and velocity, (n, 6), at angles, (n,) [rad], in the plane of the first two axes."""
+    c, s, zero = np.cos(angle), np.sin(angle), np.zeros(len(angle))
     speed = RADIUS * RATE
     return np.column_stack([RADIUS * c, RADIUS * s, zero, -speed * s, speed * c, zero])
 
 
 def raw_scene(propagator: str, **rotation: Any) -> dict[str, Any]:
     """Returns the raw scene of the body."""
-    start = orbit()[0]
+    start = orbit(np.zeros(1))[0]
     return {
         "name": f"libration_{propagator}",
         "root": "B",
@@ -49,39 +47,49 @@ def normal(q: Array) -> Array:
     return np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
 
 
-def radial(q: Array, place: Array) -> Array:
-    """Returns the direction of a position in the orbit's plane in body axes."""
+def radial(q: Array, angle: float) -> Array:
+    """Returns the direction of a place in the orbit, given by its angle [rad], in body axes."""
     w, x, y, z = q
-    c, s = place[:2] / RADIUS
     first = np.array([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)])
     second = np.array([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)])
-    return c * first + s * second
+    return np.cos(angle) * first + np.sin(angle) * second
 
 
 def flown(
-    raw: dict[str, Any], turn: Sequence[float], steps: int, every: int = 1, *, optimised: bool = False
-) -> Iterator[tuple[int, Array]]:
-    """Yields the number of a step and the state (attitude, rates), (7,), after every so many steps.
+    raw: dict[str, Any],
+    turn: Sequence[float],
+    count: int,
+    *,
+    revolution: int = 96,
+    every: int = 1,
+    optimised: bool = False,
+) -> Iterator[tuple[float, Array]]:
+    """Yields the angle along the orbit [rad] and the state (attitude, rates), (7,), as it goes on.
 
-    turn : (3,) [rad], the rotation vector out of the stable attitude, in which the body turns with the orbit
+    turn       : (3,) [rad], the rotation vector out of the stable attitude; the body turns with the orbit
+    count      : of communication steps
+    revolution : how many of them are one, so that places repeat to the bit
+    every      : steps between what is yielded
     """
-    angle = np.linalg.norm(turn)
-    q = np.array([np.cos(angle / 2), *(np.sin(angle / 2) * np.array(turn) / angle)])
-    it, places = Instance(raw, optimised=optimised), orbit().tolist()
+    size = np.linalg.norm(turn)
+    q = np.array([np.cos(size / 2), *(np.sin(size / 2) * np.array(turn) / size)])
+    it, angles = Instance(raw, optimised=optimised), 2.0 * np.pi * np.arange(revolution) / revolution
     assert it.initialise(attitude_start=q, angular_velocity_start=RATE * normal(q)) == OK, it.log
     shown = [it.references[name] for name in it.names("attitude") + it.names("angular_velocity")]
-    for count, _ in enumerate(in_orbit(it, STEP, (places[i % STEPS] for i in range(steps))), start=1):
-        if count % every == 0:
-            yield count, np.array(it.fmu.getFloat64(shown))
+    places = orbit(angles).tolist()
+    steps = in_orbit(it, PERIOD / revolution, (places[i % revolution] for i in range(count)))
+    for taken, _ in enumerate(steps, start=1):
+        if taken % every == 0:
+            yield float(angles[taken % revolution]), np.array(it.fmu.getFloat64(shown))
     it.free()
 
 
-def invariant(state: Array, count: int) -> float:
-    """Returns E over n^2 times the largest moment after a number of steps.
+def invariant(state: Array, angle: float) -> float:
+    """Returns E over n^2 times the largest moment.
 
     E = 1/2 w.J w + 3/2 n^2 r^.J r^ - 1/2 n^2 o^.J o^, w = omega - n o^, with the radius r^ and the normal o^.
     """
-    o, r = normal(state[:4]), radial(state[:4], orbit()[count % STEPS])
+    o, r = normal(state[:4]), radial(state[:4], angle)
     w, J = state[4:] / RATE - o, np.array(ALONG)
     return float(w @ (J * w) + 3.0 * r @ (J * r) - o @ (J * o)) / (2.0 * J.max())
 
@@ -95,12 +103,11 @@ class Small:
     pitch: Array
 
 
-def small(states: Sequence[tuple[int, Array]]) -> Small:
+def small(states: Iterable[tuple[float, Array]]) -> Small:
     """Returns the rotation vectors of states relative to the orbit's axes."""
     vectors = []
-    for count, state in states:
-        half = np.pi * (count % STEPS) / STEPS
-        c, s = np.cos(half), np.sin(half)
+    for angle, state in states:
+        c, s = np.cos(angle / 2), np.sin(angle / 2)
         w, x, y, z = state[:4]
         turn = np.array([c * w + s * z, c * x + s * y, c * y - s * x, c * z - s * w])
         size = np.linalg.norm(turn[1:])
