@@ -59,6 +59,7 @@ robustness: .venv/installed-dev
 stability: .venv/installed-dev
 	$(BIN)/python -m pytest -m stability tests
 	cd tests && ../$(BIN)/python -m stability.table
+	cd tests && ../$(BIN)/python -m nasa.table
 
 accuracy: .venv/installed-dev
 	$(BIN)/python -m pytest -m accuracy tests/accuracy
