@@ -82,6 +82,23 @@ Status changes_apply(Instance *instance, const double p[], const double c[]) {
     return STATUS_OK;
 }
 
+Status changes_settle(Instance *instance) {
+    Dynamics *now = &instance->now;
+    double *inputs = &now->values[REFERENCE_P], set[INPUT_P_COUNT];
+    if (now->composite_is_current) return STATUS_OK;
+    copy_p(set, inputs);
+    bool waits = false;
+    for (size_t i = 0; i < INPUT_P_COUNT; i++) {
+        if (!(INPUT_KINDS[i] & DISCRETE_KINDS) || inputs[i] == now->stepped_p[i]) continue;
+        inputs[i] = now->stepped_p[i];
+        waits = true;
+    }
+    const Status status = composite_refresh(instance);
+    copy_p(inputs, set);
+    if (waits) now->composite_is_current = false;
+    return status;
+}
+
 void changes_commit(Instance *instance) {
     Dynamics *now = &instance->now;
     changes_mirror(instance);

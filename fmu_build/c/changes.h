@@ -52,10 +52,19 @@ Status changes_reverse(Instance *instance, Variation *v);
 void changes_start_forward(Instance *instance, Variation *v);
 void changes_start_reverse(Instance *instance, Variation *v);
 
-/* Goes on to EVENT; changes of inputs begin from the states as they are. */
-static inline void changes_enter_event(Instance *instance) {
-    if (instance->now.state == CONTINUOUS) changes_commit(instance);
+/* In continuous time: has continuous inputs as they were set, whether or not anything that follows from them has been
+   read. Discrete ones that were set there wait for the event. */
+Status changes_settle(Instance *instance);
+
+/* Goes on to EVENT; changes of inputs begin from the states and the continuous inputs as they are. */
+static inline Status changes_enter_event(Instance *instance) {
+    if (instance->now.state == CONTINUOUS) {
+        const Status status = changes_settle(instance);
+        if (status != STATUS_OK) return status;
+        changes_commit(instance);
+    }
     instance->now.state = EVENT;
+    return STATUS_OK;
 }
 
 /* Ends an iteration of event mode: judges what was set, and whether that changed the states. */

@@ -5,6 +5,12 @@
 
 #include "changes.h"
 
+/* What keeps the momentum beside what keeps the rate: continuous time would need its own rates. */
+enum {
+    DISCRETE_KINDS =
+        STATE_IS_MOMENTUM ? 0 : (MASSES_KEEP_MOMENTUM ? KIND_MASS : 0) | (POSES_KEEP_MOMENTUM ? KIND_POSE : 0)
+};
+
 /* Judges a change to p in continuous time. */
 Status exchange_check_continuous(Instance *instance, const double p[]);
 

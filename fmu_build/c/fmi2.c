@@ -268,8 +268,7 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component instance, const fmi2Byte bytes[
 
 fmi2Status fmi2EnterEventMode(fmi2Component instance) {
     if (!instance || !instance_admits(instance, &ENTER_EVENT)) return fmi2Error;
-    changes_enter_event(instance);
-    return fmi2OK;
+    return (fmi2Status)changes_enter_event(instance);
 }
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component instance, fmi2EventInfo *info) {

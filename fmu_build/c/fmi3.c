@@ -49,7 +49,7 @@ static const Call FREE_STATE = {"fmi3FreeFMUState", OUTSIDE_CALLBACK, STATUS_ERR
 static const Call STATE_SIZE = {"fmi3SerializedFMUStateSize", OUTSIDE_CALLBACK, STATUS_ERROR};
 static const Call SERIALIZE = {"fmi3SerializeFMUState", OUTSIDE_CALLBACK, STATUS_ERROR};
 static const Call DESERIALIZE = {"fmi3DeserializeFMUState", OUTSIDE_CALLBACK, STATUS_ERROR};
-static const Call ENTER_EVENT = {"fmi3EnterEventMode", EVENT_FOLLOWS, STATUS_ERROR};
+static const Call ENTER_EVENT = {"fmi3EnterEventMode", EVENT_FOLLOWS, STATUS_DISCARD};
 static const Call UPDATE_DISCRETE = {"fmi3UpdateDiscreteStates", EVENT, STATUS_DISCARD};
 static const Call ENTER_CONTINUOUS = {"fmi3EnterContinuousTimeMode", ONLY_EXCHANGE | EVENT, STATUS_DISCARD};
 static const Call COMPLETED_STEP = {"fmi3CompletedIntegratorStep", CONTINUOUS, STATUS_ERROR};
@@ -323,8 +323,7 @@ fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
     if (!instance || !instance_admits(instance, &ENTER_EVENT)) return fmi3Error;
     if (HAS_EVENT_MODE && ((Instance *)instance)->now.state == STEPPING && !((Instance *)instance)->event_mode_used)
         return (fmi3Status)instance_error(instance, "eventModeUsed was false when the instance was made");
-    changes_enter_event(instance);
-    return fmi3OK;
+    return (fmi3Status)changes_enter_event(instance);
 }
 
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *need_update, fmi3Boolean *terminate,

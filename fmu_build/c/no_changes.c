@@ -19,6 +19,11 @@ void changes_begin(Instance *instance) {
     (void)instance;
 }
 
+Status changes_settle(Instance *instance) {
+    (void)instance;
+    return STATUS_OK;
+}
+
 void changes_commit(Instance *instance) {
     bound_over_change(instance);
     bound_remember(instance);

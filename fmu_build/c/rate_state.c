@@ -11,9 +11,8 @@ void changes_mirror(Instance *instance) {
 /* Where masses keep the rate and poses the momentum, or the other way round, a change in continuous time would need
    the inputs' own rates, which FMI does not give. */
 Status exchange_check_continuous(Instance *instance, const double p[]) {
-    const unsigned keeping = (MASSES_KEEP_MOMENTUM ? KIND_MASS : 0) | (POSES_KEEP_MOMENTUM ? KIND_POSE : 0);
     for (size_t i = 0; i < INPUT_P_COUNT; i++) {
-        if (!(INPUT_KINDS[i] & keeping) || p[i] == instance->now.stepped_p[i]) continue;
+        if (!(INPUT_KINDS[i] & DISCRETE_KINDS) || p[i] == instance->now.stepped_p[i]) continue;
         const Variable *variable = &VARIABLES[REFERENCE_P + i];
         return instance_refuse(instance,
                                "%s = %.10g%s%s: changed from %.10g in continuous-time mode, but %s keep the angular "

@@ -18,10 +18,12 @@ from changes.histories import (
 from changes.scenes import DURATION, MIXED, STEADY, TUG, brought, drawn_in
 from fmu.listeners import Listener
 from fmu.saved_states import bytes_of, restore
-from support import DISCARD, EPS, OK, Instance, scene, variant
+from supervessel import reference
+from support import DISCARD, EPS, OK, Instance, refusal, scene, variant
 from support.marks import FMI
 
 SCENES = pytest.mark.parametrize("raw", [TUG, MIXED, STEADY], ids=["momentum", "mixed", "rate"])
+TURNED = variant(TUG, {"name": "turned", "rotation.pose_change": "rate"})
 GONE = {"held.docked": 0.0}
 MOVED = drawn_in(DURATION / 2)
 
@@ -76,6 +78,54 @@ def test_states_set_to_what_they_are_begin_a_change_as_well(raw):
         found.append(driver.angular_velocity.tolist())
         instance.free()
     assert found[0] == found[1]
+
+
+@FMI
+@pytest.mark.parametrize("read", [False, True])
+@pytest.mark.parametrize("raw", [TUG, TURNED], ids=["momentum", "turned"])
+def test_what_moved_in_continuous_time_has_moved_before_the_event_read_or_not(raw, read, fmi):
+    flown, start, moved = scene(raw), start_values(scene(raw)), dict(MOVED)
+    if raw is TURNED:
+        moved = {name: x for name, x in moved.items() if name.startswith("tug.arm")}
+    happens = GONE | {"tank.mass": 900.0} if raw is TUG else {"tank.mass": 900.0}
+    between = reference.change(flown, flown.rotation.angular_velocity, start, start | moved)
+    expected = reference.change(flown, between, start | moved, start | moved | happens)
+    driver = ByExchange(raw, fmi)
+    instance = driver.instance
+    assert instance.set(moved) == OK
+    if read:
+        instance.get("angular_velocity")
+    driver.set(happens)
+    # Sums of a few products of numbers up to ten times the result, at either side.
+    assert np.abs(driver.angular_velocity - expected).max() <= 256 * EPS * np.abs(expected).max()
+    instance.free()
+
+
+@FMI
+def test_an_event_is_not_entered_with_continuous_inputs_that_cannot_be_used(fmi):
+    driver = ByExchange(TUG, fmi)
+    instance = driver.instance
+    assert instance.set({"tank.mass": -1.0}) == OK
+    assert instance._status(instance.fmu.enterEventMode) == refusal(fmi)
+    assert "tank.mass = -1 kg: must be >= 0" in instance.messages()[-1]
+    assert instance.set({"tank.mass": 400.0}) == OK
+    driver.set(GONE)
+    assert driver.angular_velocity.tolist() == pytest.approx([0.2, -0.3, 0.1], rel=1e-14)
+    instance.free()
+
+
+@FMI
+def test_a_discrete_input_that_was_set_in_continuous_time_waits_for_the_event(fmi):
+    flown, start = scene(MIXED), start_values(scene(MIXED))
+    pose = {name: x for name, x in MOVED.items() if name.startswith("tug.arm")}
+    expected = reference.change(
+        flown, flown.rotation.angular_velocity, start, start | pose | {"tank.mass": 900.0}
+    )
+    driver = ByExchange(MIXED, fmi)
+    assert driver.instance.set(pose | {"tank.mass": 900.0}) == OK
+    driver.set({})
+    assert np.abs(driver.angular_velocity - expected).max() <= 256 * EPS * np.abs(expected).max()
+    driver.instance.free()
 
 
 @FMI
