@@ -1,6 +1,7 @@
 """The command python -m fmu_build.compatibility SCENE.toml ... -o FOLDER."""
 
 import argparse
+import os
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -13,6 +14,9 @@ from fmu_build.platforms import Platform, host_platform
 from supervessel.problems import printable
 from supervessel.shell.console import Parser, print_problem, print_results, show_progress
 from supervessel.shell.ending import say
+
+PART = ".supervessel-"
+"""Beginning of the names of folders on their way into place."""
 
 # What takes time to import is imported where it is needed: help and wrong usage need none of it.
 
@@ -65,30 +69,38 @@ def _offer(options: argparse.Namespace, platforms: Sequence[Platform]) -> int:
 
 def _check(folder: Path) -> None:
     """Raises BuildError where the folder cannot be made: where it is there already and is not empty."""
-    name = printable(str(folder))
+    name, place = printable(str(folder)), _place(folder)
     try:
-        if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
+        if place.exists() and not (place.is_dir() and not any(place.iterdir())):
             raise BuildError(f"{name}: is there already; remove it or take another name")
-        if not folder.absolute().parent.is_dir():
-            raise BuildError(f"{name}: there is no folder {printable(str(folder.absolute().parent))}")
+        if place == _place(Path()):
+            raise BuildError(f"{name}: is the working folder, which cannot be replaced; name a folder in it")
+        if not place.parent.is_dir():
+            raise BuildError(f"{name}: there is no folder {printable(str(place.parent))}")
+        Path(tempfile.mkdtemp(prefix=PART, dir=place.parent)).rmdir()
     except OSError as error:
         raise BuildError(f"{name}: {error.strerror}") from None
 
 
+def _place(folder: Path) -> Path:
+    """Returns where a folder is or will be, links followed."""
+    return Path(os.path.realpath(folder))
+
+
 def _write(folder: Path, files: Mapping[str, bytes]) -> None:
     """Writes files into a folder that appears when it is whole. Raises BuildError if it cannot."""
-    part = None
+    part, place = None, _place(folder)
     try:
-        part = Path(tempfile.mkdtemp(prefix=".supervessel-", dir=folder.absolute().parent))
+        part = Path(tempfile.mkdtemp(prefix=PART, dir=place.parent))
         whole = part / "whole"
-        for place, content in files.items():
-            file = whole / place
+        for name, content in files.items():
+            file = whole / name
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_bytes(content)
         _check(folder)  # something else may have come there in the meantime
-        if folder.exists():
-            folder.rmdir()
-        whole.rename(folder)
+        if place.exists():
+            place.rmdir()
+        whole.rename(place)
     except OSError as error:
         raise BuildError(f"{printable(str(folder))}: {error.strerror}") from None
     finally:

@@ -1,6 +1,7 @@
 """Compatibility information: what `python -m fmu_build.compatibility` makes, by the rules and by FMPy."""
 
 import re
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -48,6 +49,8 @@ NAMES = ["B.mass", "berth.docked", *(f"berth.{k}[{i}]" for k in ("velocity", "ra
 NAMES += [f"torque[{i}]" for i in (1, 2, 3)]
 NUMBER = r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?"
 """A floating-point literal of C without suffix."""
+
+needs_proc = pytest.mark.skipif(sys.platform != "linux", reason="/proc is missing: it is Linux's")
 
 INTERFACES = {"cs": "CoSimulation", "me": "ModelExchange"}
 
@@ -183,6 +186,34 @@ def test_a_folder_that_holds_something_is_left_alone(folder, capsys):
     assert main([str(folder.parent / "pair.toml"), "-o", str(place)]) == 1
     assert capsys.readouterr().err.endswith("mine: is there already; remove it or take another name\n")
     assert [path.name for path in place.iterdir()] == ["note"]
+
+
+def test_a_link_to_an_empty_folder_is_followed(tmp_path):
+    (tmp_path / "ball.toml").write_text(BALL)
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "link").symlink_to("empty")
+    (tmp_path / "ahead").symlink_to("new")
+    for link, target in (("link", "empty"), ("ahead", "new")):
+        assert main([str(tmp_path / "ball.toml"), "-o", str(tmp_path / link)]) == 0
+        assert (tmp_path / link).is_symlink()
+        assert (tmp_path / target / "Readme.txt").is_file()
+
+
+@pytest.mark.parametrize(
+    ("place", "reason"),
+    [
+        (".", "is the working folder, which cannot be replaced; name a folder in it"),
+        pytest.param("/proc/made", "No such file or directory", marks=needs_proc),
+    ],
+)
+def test_a_folder_that_cannot_be_made_is_refused_before_any_work(
+    tmp_path, capsys, monkeypatch, place, reason
+):
+    (tmp_path / "empty").mkdir()
+    monkeypatch.chdir(tmp_path / "empty")
+    assert main([str(tmp_path / "no_scene_is_read.toml"), "-o", place]) == 1
+    assert capsys.readouterr().err == f"{place}: {reason}\n"
+    assert [path.name for path in tmp_path.rglob("*")] == ["empty"]
 
 
 def test_scenes_of_one_name_are_refused(tmp_path, capsys):
