@@ -170,7 +170,9 @@ def _after_change(model: Equations, z: ca.SX, inputs: tuple[ca.SX, ca.SX], c: ca
     inputs : p and k
     Only its structure has a meaning. An angular momentum is kept when a mass or a pose changes. An angular
     velocity jumps then by an amount that depends on the inputs before and after. When a dock opens or
-    closes, both jump, by what all inputs of the composite and the motion at contact make of them.
+    closes, both jump, by what all inputs of the composite and the motion at contact make of them. The jump is
+    scaled by a symbol of its own: CasADi would see what it has in common with what it is added to, and take
+    that off.
     """
     change, scene, (p, k) = model.change, model.resolved.scene, inputs
     if change is None:
@@ -184,7 +186,7 @@ def _after_change(model: Equations, z: ca.SX, inputs: tuple[ca.SX, ca.SX], c: ca
         jump += change.momentum_of(docked, c) if by_momentum else docked
         shaping = zip(model.resolved.shaping, ca.vertsplit(p), strict=True)
         jump += sum((flag for variable, flag in shaping if variable.boolean), ca.SX(0))
-    return ca.vertcat(z[:4], z[4:] + jump)
+    return ca.vertcat(z[:4], z[4:] + ca.SX.sym("scale") * jump)
 
 
 def _rows(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from changes.pairs import OF_VESSELS, SCENES, SHOWN, everywhere
+from changes.pairs import OF_VESSELS, SCENES, SHOWN, Found, Place, everywhere
 from changes.scenes import TUG, TUG_EVENTS
 from support import EPS, OK, Instance, variant
 
@@ -14,6 +14,15 @@ from support import EPS, OK, Instance, variant
 )
 def test_derivatives_are_differences_of_what_is_read_and_all_that_counts_is_declared(name, fmi):
     assert everywhere(SCENES[name], fmi).problems == []
+
+
+@pytest.mark.parametrize("place", ["me continuous", "me event", "cs stepping"])
+def test_the_motion_of_the_only_port_that_moves_is_declared_too(place):
+    at, found = Place(variant(TUG, {"name": "arm", "inputs.motion": ["tug.arm"]}), place, ()), Found()
+    at.compare(found)
+    at.free()
+    assert found.problems == []
+    assert ("angular_velocity[1]", "tug.arm.velocity[3]") in found.moved
 
 
 def test_derivatives_are_finite_while_a_vessel_is_detached_or_comes_back():
