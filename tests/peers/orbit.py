@@ -155,7 +155,10 @@ def scipy(method: str) -> Callable[[Work], Settings]:
 
 
 def heyoka(work: Work) -> Settings:
-    """The way of heyoka's Taylor integrator, compiled for this very body."""
+    """The way of heyoka's Taylor integrator, compiled for this very body.
+
+    Its tolerance is relative to the largest number of the state: places are in units of the orbit's radius.
+    """
     hy = import_module("heyoka")
     q0, q1, q2, q3, p, q, r, *rest = hy.make_vars(*(f"x{i}" for i in range(13)))
     place, velocity = rest[:3], rest[3:]
@@ -167,7 +170,8 @@ def heyoka(work: Work) -> Settings:
         [2.0 * (q1 * q3 - q0 * q2), 2.0 * (q2 * q3 + q0 * q1), 1.0 - 2.0 * (q1 * q1 + q2 * q2)],
     ]
     body = [sum(R[i][j] * place[i] for i in range(3)) for j in range(3)]
-    strength = 3.0 * EARTH * square**-2.5
+    mu = EARTH / HEIGHT**3
+    strength = 3.0 * mu * square**-2.5
 
     def cross(a: Any, b: Any) -> list[Any]:
         return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
@@ -185,15 +189,16 @@ def heyoka(work: Work) -> Settings:
         0.5 * (q0 * r + q1 * q - q2 * p),
         *times(inverse, torque),
         *velocity,
-        *(-EARTH * square**-1.5 * c for c in place),
+        *(-mu * square**-1.5 * c for c in place),
     ]
     system = list(zip([q0, q1, q2, q3, p, q, r, *rest], rates, strict=True))
+    begun = start(work) / np.array([1.0] * 7 + [HEIGHT] * 6)
     for tolerance in tolerances():
-        made = hy.taylor_adaptive(system, start(work), tol=tolerance)
+        made = hy.taylor_adaptive(system, begun, tol=tolerance)
 
         def ready(made: Any = made) -> Flight:
             made.time = 0.0
-            made.state[:] = start(work)
+            made.state[:] = begun
 
             def fly() -> Array:
                 made.propagate_until(work.duration)
