@@ -39,7 +39,7 @@ static bool states_follow(const Instance *instance) {
 }
 
 /* The rate before docks close. */
-static Status rate_before_docking(Instance *instance, double rate[3]) {
+static Status rate_before_docking(Instance *instance, double rate[RATE_COUNT]) {
     const Dynamics *now = &instance->now;
     changes_begin(instance);
     memcpy(rate, now->kept_rate, sizeof now->kept_rate);
@@ -48,7 +48,7 @@ static Status rate_before_docking(Instance *instance, double rate[3]) {
 
 Status changes_forward(Instance *instance, Variation *v) {
     if (!states_follow(instance)) return STATUS_OK;
-    double rate[3], change[3] = {0.0, 0.0, 0.0};
+    double rate[RATE_COUNT], change[RATE_COUNT] = {0.0};
     Status status = rate_before_docking(instance, rate);
     if (status == STATUS_OK) status = rate_on_the_way_forward(instance, v, change);
     if (status != STATUS_OK) return status;
@@ -59,7 +59,7 @@ Status changes_forward(Instance *instance, Variation *v) {
 
 Status changes_reverse(Instance *instance, Variation *v) {
     if (!states_follow(instance)) return STATUS_OK;
-    double rate[3], weight[3], on_composite[COMPOSITE_COUNT] = {0.0};
+    double rate[RATE_COUNT], weight[RATE_COUNT], on_composite[COMPOSITE_COUNT] = {0.0};
     const Status status = rate_before_docking(instance, rate);
     if (status != STATUS_OK) return status;
     exchange_reverse(instance, v, weight, on_composite);

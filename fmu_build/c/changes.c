@@ -17,7 +17,7 @@ static void copy_p(double to[], const double from[]) {
 }
 
 /* Refuses a change that leaves such a rate; the first dock that closes is named. */
-static Status refuse_rate(Instance *instance, const double p[], const double rate[3]) {
+static Status refuse_rate(Instance *instance, const double p[], const double rate[RATE_COUNT]) {
     const char *closing = docks_first_closing(instance, p);
     const char *name = closing ? closing : "", *words = closing ? " = true with this motion" : "the change";
     return instance_refuse(instance, "%s%s leaves angular_velocity = (%.10g, %.10g, %.10g) rad/s: must be finite", name,
@@ -25,7 +25,7 @@ static Status refuse_rate(Instance *instance, const double p[], const double rat
 }
 
 /* The angular velocity after a change from what was committed to p, whose composite is c. */
-static Status rate_after(Instance *instance, const double p[], const double c[], double rate[3]) {
+static Status rate_after(Instance *instance, const double p[], const double c[], double rate[RATE_COUNT]) {
     const Dynamics *now = &instance->now;
     memcpy(rate, now->kept_rate, sizeof now->kept_rate);
     if (memcmp(p, now->stepped_p, INPUT_P_COUNT * sizeof(double)) == 0) return STATUS_OK;
@@ -66,7 +66,7 @@ static Status apply_continuous(Instance *instance, const double p[], const doubl
 }
 
 Status changes_apply(Instance *instance, const double p[], const double c[]) {
-    double rate[3];
+    double rate[RATE_COUNT];
     if (changes_state(instance) & BEFORE_START) {
         become_current(instance, p, c);
         instance_state_moved(instance);

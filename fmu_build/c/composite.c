@@ -21,7 +21,9 @@
 static const double SHORTEST = 1e-60;
 static const double LONGEST = 1e60;
 
-static Status check_mass(Instance *instance, const Variable *variable, const double *mass) {
+static Status check_mass(Instance *instance, const Variable *variable, const double *mass, bool has_wheels) {
+    if (has_wheels && *mass == 0.0)
+        return instance_refuse(instance, "%s = 0 kg: must be > 0, since the vessel has wheels", variable->name);
     if (*mass >= 0.0) return STATUS_OK;
     return instance_refuse(instance, "%s = %.10g kg: must be >= 0", variable->name, *mass);
 }
@@ -104,8 +106,9 @@ static Status check_inputs(Instance *instance, double p[]) {
         const size_t place = judged->reference - REFERENCE_P;
         const Variable *variable = &VARIABLES[judged->reference];
         const double *value = &now->values[judged->reference];
-        if (judged->check == CHECK_MASS)
-            status = check_mass(instance, variable, value);
+        const bool has_wheels = STATE_COUNT > 7 && judged->check == CHECK_MASS_OF_WHEELS;
+        if (judged->check == CHECK_MASS || has_wheels)
+            status = check_mass(instance, variable, value, has_wheels);
         else if (judged_before && memcmp(value, &now->p[place], together[judged->check] * sizeof *value) == 0)
             continue;
         else if (judged->check == CHECK_PMI)
@@ -142,8 +145,10 @@ static Status check_composite(Instance *instance, const double *c) {
                                h[0], h[1], h[2]);
     const double *J = &c[COMPOSITE_INERTIA];
     return instance_refuse(instance,
-                           "inertia (xx, yy, zz, xy, xz, yz) = (%.10g, %.10g, %.10g, %.10g, %.10g, %.10g) kg.m2: "
-                           "must be finite%s",
+                           STATE_COUNT > 7 ? "inertia (xx, yy, zz, xy, xz, yz) = (%.10g, %.10g, %.10g, %.10g, %.10g, "
+                                             "%.10g) kg.m2, less what wheels have about their axes: must be finite%s"
+                                           : "inertia (xx, yy, zz, xy, xz, yz) = (%.10g, %.10g, %.10g, %.10g, %.10g, "
+                                             "%.10g) kg.m2: must be finite%s",
                            J[0], J[1], J[2], J[3], J[4], J[5], LAW_TURNS ? " and positive definite" : "");
 }
 

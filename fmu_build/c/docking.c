@@ -28,7 +28,7 @@ static void motion_at_contact(Instance *instance, const double p[], double motio
     contact_momentum(instance->arg, instance->res, instance->iw, instance->w, 0);
 }
 
-void docks_join(Instance *instance, const double p[], const double c[], double rate[3]) {
+void docks_join(Instance *instance, const double p[], const double c[], double rate[RATE_COUNT]) {
     double motion[INPUT_K_COUNT], momentum[3], next[3];
     motion_at_contact(instance, p, motion, momentum);
     instance->arg[0] = rate;
@@ -39,7 +39,8 @@ void docks_join(Instance *instance, const double p[], const double c[], double r
     memcpy(rate, next, sizeof next);
 }
 
-void docks_join_forward(Instance *instance, const Variation *v, const double rate[3], double change[3]) {
+void docks_join_forward(Instance *instance, const Variation *v, const double rate[RATE_COUNT],
+                        double change[RATE_COUNT]) {
     const double *p = instance->now.p;
     if (!docks_first_closing(instance, p)) return;
     double motion[INPUT_K_COUNT], small_motion[INPUT_K_COUNT], momentum[3], brought[3], next[3];
@@ -57,11 +58,11 @@ void docks_join_forward(Instance *instance, const Variation *v, const double rat
     memcpy(change, next, sizeof next);
 }
 
-void docks_join_reverse(Instance *instance, const double rate[3], double weight[3], double on_composite[],
-                        Variation *v) {
+void docks_join_reverse(Instance *instance, const double rate[RATE_COUNT], double weight[RATE_COUNT],
+                        double on_composite[], Variation *v) {
     const double *p = instance->now.p;
     if (!docks_first_closing(instance, p)) return;
-    double motion[INPUT_K_COUNT], momentum[3], on_rate[3], brought[3], wc[COMPOSITE_COUNT];
+    double motion[INPUT_K_COUNT], momentum[3], on_rate[RATE_COUNT], brought[3], wc[COMPOSITE_COUNT];
     double on_p[INPUT_P_COUNT], on_motion[INPUT_K_COUNT];
     motion_at_contact(instance, p, motion, momentum);
     const double *const docking[] = {rate, momentum, instance->now.c, weight};
@@ -78,7 +79,7 @@ void docks_join_reverse(Instance *instance, const double rate[3], double weight[
     for (size_t i = 0; i < INPUT_P_COUNT; i++) v->inputs[i] += on_p[i];
     for (size_t i = 0; i < INPUT_K_COUNT; i++) v->inputs[INPUT_P_COUNT + i] += on_motion[i];
     for (size_t i = 0; i < COMPOSITE_COUNT; i++) on_composite[i] += wc[i];
-    memcpy(weight, on_rate, sizeof on_rate);
+    memcpy(weight, on_rate, 3 * sizeof(double));
 }
 
 const char *docks_first_closing(const Instance *instance, const double p[]) {

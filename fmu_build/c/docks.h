@@ -27,13 +27,14 @@ static inline const char *flag_name(const Dock *dock) {
 Status docks_check(Instance *instance, const double p[]);
 
 /* Adds to the rate what the docks that close bring along; c is the composite with them closed. */
-void docks_join(Instance *instance, const double p[], const double c[], double rate[3]);
+void docks_join(Instance *instance, const double p[], const double c[], double rate[RATE_COUNT]);
 
 /* Carries a small change of the rate [rad/s] from before docks close to after it; v has those of the inputs and the
    composite. Reverse: carries weights on the rate back, and adds to those on the composite and on the inputs. */
-void docks_join_forward(Instance *instance, const Variation *v, const double rate[3], double change[3]);
-void docks_join_reverse(Instance *instance, const double rate[3], double weight[3], double on_composite[],
-                        Variation *v);
+void docks_join_forward(Instance *instance, const Variation *v, const double rate[RATE_COUNT],
+                        double change[RATE_COUNT]);
+void docks_join_reverse(Instance *instance, const double rate[RATE_COUNT], double weight[RATE_COUNT],
+                        double on_composite[], Variation *v);
 
 /* The name of the input of the first dock that closes, or NULL. */
 const char *docks_first_closing(const Instance *instance, const double p[]);
@@ -45,15 +46,16 @@ static inline Status docks_check(Instance *instance, const double p[]) {
     return STATUS_OK;
 }
 
-static inline void docks_join(Instance *instance, const double p[], const double c[], double rate[3]) {
+static inline void docks_join(Instance *instance, const double p[], const double c[], double rate[RATE_COUNT]) {
     (void)instance, (void)p, (void)c, (void)rate;
 }
 
-static inline void docks_join_forward(Instance *instance, const Variation *v, const double rate[3], double change[3]) {
+static inline void docks_join_forward(Instance *instance, const Variation *v, const double rate[RATE_COUNT],
+                                      double change[RATE_COUNT]) {
     (void)instance, (void)v, (void)rate, (void)change;
 }
 
-static inline void docks_join_reverse(Instance *instance, const double rate[3], double weight[3],
+static inline void docks_join_reverse(Instance *instance, const double rate[RATE_COUNT], double weight[RATE_COUNT],
                                       double on_composite[], Variation *v) {
     (void)instance, (void)rate, (void)weight, (void)on_composite, (void)v;
 }

@@ -15,7 +15,7 @@ enum {
 Status exchange_check_continuous(Instance *instance, const double p[]);
 
 /* Makes x and the states what they are after a change, which leaves such a rate [rad/s]; p and c are current. */
-void exchange_take_rate(Instance *instance, const double rate[3]);
+void exchange_take_rate(Instance *instance, const double rate[RATE_COUNT]);
 
 /* Keeps what the next change begins from, once changes.c has kept the rate. */
 void exchange_commit(Instance *instance);
@@ -25,7 +25,7 @@ bool exchange_follows(const Instance *instance);
 
 /* Adds to v->x the small change of the state by one of the rate [rad/s]; v->c is that of the composite. Reverse: gives
    the weight on the rate, and adds to that on the composite, that follow from the weight on the state. */
-void exchange_forward(Instance *instance, const double change[3], Variation *v);
-void exchange_reverse(Instance *instance, const Variation *v, double weight[3], double on_composite[]);
+void exchange_forward(Instance *instance, const double change[RATE_COUNT], Variation *v);
+void exchange_reverse(Instance *instance, const Variation *v, double weight[RATE_COUNT], double on_composite[]);
 
 #endif

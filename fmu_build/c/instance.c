@@ -15,6 +15,7 @@
 #include "changes.h"
 #include "error_bound.h"
 #include "field.h"
+#include "motors.h"
 #include "variables.h"
 
 enum { MESSAGE_SIZE = 1024, LONGEST_NAME = 200 };
@@ -243,7 +244,9 @@ Status instance_start_attitude(Instance *instance) {
 }
 
 void instance_start_rate(Instance *instance) {
-    memcpy(instance_x(instance) + 4, &instance->now.values[REFERENCE_RATE_START], 3 * sizeof(double));
+    double *x = instance_x(instance);
+    memcpy(x + 4, &instance->now.values[REFERENCE_RATE_START], 3 * sizeof(double));
+    memcpy(x + 7, &instance->now.values[REFERENCE_ATTITUDE_START + 4], (STATE_COUNT - 7) * sizeof(double));
     instance_state_moved(instance);
 }
 
@@ -252,6 +255,7 @@ Status instance_exit_initialization(Instance *instance) {
     Status status = instance_start_attitude(instance);
     if (status == STATUS_OK) status = composite_refresh(instance);
     if (status == STATUS_OK) status = field_check(instance);
+    if (status == STATUS_OK) status = motors_check(instance);
     if (status != STATUS_OK) return status;
     changes_start(instance);
     bound_start(instance);

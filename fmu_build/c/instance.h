@@ -100,6 +100,9 @@ typedef bool (*SubStepListener)(Instance *instance, double *end);
    then): a free step that stands alone costs nothing more. */
 typedef enum { EPOCH_NEW, EPOCH_SERVED, EPOCH_DOUBLED } EpochStep;
 
+/* The angular velocity and, behind it, the momenta of wheels: all that of x is not the attitude. */
+enum { RATE_COUNT = STATE_COUNT - 4 };
+
 /* Places in errors. */
 enum { ESTIMATE, BOUND };
 
@@ -115,9 +118,9 @@ typedef struct {
     struct {
         double rate[ERROR_BOUND ? 3 : 1], c[ERROR_BOUND ? COMPOSITE_COUNT : 1], p[ERROR_BOUND ? INPUT_P_COUNT + 1 : 1];
     } bound_from;                     /* rate, composite and inputs that the bound's next change begins from */
-    double x[STATE_IS_MOMENTUM ? STATE_COUNT : 1]; /* attitude and angular velocity; the states hold the momentum */
+    double x[STATE_IS_MOMENTUM ? STATE_COUNT : 1]; /* as of instance_x; the states hold the momentum of the whole */
     double kept_momentum[STATE_IS_MOMENTUM ? 3 : 1]; /* N.m.s, of the states when changes were committed last */
-    double kept_rate[CHANGES ? 3 : 1]; /* rad/s, that a change of inputs began from, with stepped_p */
+    double kept_rate[CHANGES ? RATE_COUNT : 1]; /* rad/s, N.m.s: that a change of inputs began from, with stepped_p */
     double kept_c[CHANGES ? COMPOSITE_COUNT : 1]; /* the composite of stepped_p */
     double p[INPUT_P_COUNT + 1];      /* the composite's inputs, directions scaled; + 1: may be none */
     double c[COMPOSITE_COUNT];        /* the composite of p */
@@ -216,8 +219,8 @@ void instance_inform(Instance *instance, LogCategory category, const char *forma
    unknown name is an error, and nothing is changed. */
 Status instance_set_logging(Instance *instance, bool on, size_t count, const char *const names[]);
 
-/* Where the FMU's states (attitude w, x, y, z; angular velocity, rad/s, or momentum, N.m.s) and their rates stand among
-   the values. */
+/* Where the FMU's states (attitude w, x, y, z; angular velocity, rad/s, or momentum, N.m.s; momenta of wheels) and their
+   rates stand among the values. */
 static inline double *instance_states(Instance *instance) {
     return &instance->now.values[REFERENCE_STATES];
 }
@@ -225,7 +228,7 @@ static inline double *instance_rates(Instance *instance) {
     return &instance->now.values[REFERENCE_DERIVATIVES];
 }
 
-/* Attitude and angular velocity. */
+/* Attitude, angular velocity and momenta of wheels. */
 static inline double *instance_x(Instance *instance) {
     return STATE_IS_MOMENTUM ? instance->now.x : instance_states(instance);
 }
@@ -278,7 +281,7 @@ Status instance_set_experiment(Instance *instance, bool tolerance_defined, doubl
 /* Judges what was set, fixes the state at the start and goes on to STEPPING or EVENT. */
 Status instance_exit_initialization(Instance *instance);
 
-/* Takes the states at the start from the parameters, the attitude at length 1. */
+/* Takes the states at the start from the parameters, the attitude at length 1; with the rate those of wheels. */
 Status instance_start_attitude(Instance *instance);
 void instance_start_rate(Instance *instance);
 

@@ -11,7 +11,7 @@
 /* A stage that keeps the momentum, from before it to after it, and the rate before it. */
 typedef struct {
     Stage before, after;
-    double rate[3];
+    double rate[RATE_COUNT];
     unsigned varied_before, varied_after; /* kinds of inputs that are as now */
 } Keeping;
 
@@ -33,7 +33,7 @@ static Status stage_of(Instance *instance, unsigned kind, Keeping *stage) {
     return status == STATUS_OK ? weigh_stage(instance, &stage->after) : status;
 }
 
-static Status stage_forward(Instance *instance, const Variation *v, unsigned kind, double change[3]) {
+static Status stage_forward(Instance *instance, const Variation *v, unsigned kind, double change[RATE_COUNT]) {
     Keeping stage;
     double before[COMPOSITE_COUNT], after[COMPOSITE_COUNT], next[3];
     const Status status = stage_of(instance, kind, &stage);
@@ -48,9 +48,9 @@ static Status stage_forward(Instance *instance, const Variation *v, unsigned kin
     return STATUS_OK;
 }
 
-static Status stage_reverse(Instance *instance, double weight[3], unsigned kind, Variation *v) {
+static Status stage_reverse(Instance *instance, double weight[RATE_COUNT], unsigned kind, Variation *v) {
     Keeping stage;
-    double on_rate[3], before[COMPOSITE_COUNT], after[COMPOSITE_COUNT];
+    double on_rate[RATE_COUNT], before[COMPOSITE_COUNT], after[COMPOSITE_COUNT];
     const Status status = stage_of(instance, kind, &stage);
     if (status != STATUS_OK) return status;
     const double *const arguments[] = {stage.rate, stage.before.c, stage.after.c, weight};
@@ -60,16 +60,16 @@ static Status stage_reverse(Instance *instance, double weight[3], unsigned kind,
     keep_momentum_reverse(instance->arg, instance->res, instance->iw, instance->w, 0);
     weigh_inputs(instance, stage.before.p, before, stage.varied_before, v);
     weigh_inputs(instance, stage.after.p, after, stage.varied_after, v);
-    memcpy(weight, on_rate, sizeof on_rate);
+    memcpy(weight, on_rate, 3 * sizeof(double));
     return STATUS_OK;
 }
 
-Status rate_on_the_way_forward(Instance *instance, const Variation *v, double change[3]) {
+Status rate_on_the_way_forward(Instance *instance, const Variation *v, double change[RATE_COUNT]) {
     const Status status = MASSES_KEEP_MOMENTUM ? stage_forward(instance, v, KIND_MASS, change) : STATUS_OK;
     return POSES_KEEP_MOMENTUM && status == STATUS_OK ? stage_forward(instance, v, KIND_POSE, change) : status;
 }
 
-Status rate_on_the_way_reverse(Instance *instance, double weight[3], Variation *v) {
+Status rate_on_the_way_reverse(Instance *instance, double weight[RATE_COUNT], Variation *v) {
     const Status status = POSES_KEEP_MOMENTUM ? stage_reverse(instance, weight, KIND_POSE, v) : STATUS_OK;
     return MASSES_KEEP_MOMENTUM && status == STATUS_OK ? stage_reverse(instance, weight, KIND_MASS, v) : status;
 }

@@ -29,7 +29,7 @@ Status weigh_stage(Instance *instance, Stage *stage) {
 
 /* Goes on from a stage to one where inputs of some kinds are as in p, whose composite is c, keeping the momentum. */
 static Status keep(Instance *instance, Stage *stage, const double p[], const double c[], unsigned kinds,
-                   double rate[3]) {
+                   double rate[RATE_COUNT]) {
     if (memcmp(stage->p, p, sizeof stage->p) == 0) return STATUS_OK;
     Stage next = *stage;
     double changed[3];
@@ -51,11 +51,11 @@ static Status keep(Instance *instance, Stage *stage, const double p[], const dou
     return STATUS_OK;
 }
 
-Status move_keeping_momentum(Instance *instance, Stage *stage, unsigned kinds, double rate[3]) {
+Status move_keeping_momentum(Instance *instance, Stage *stage, unsigned kinds, double rate[RATE_COUNT]) {
     return keep(instance, stage, instance->now.p, instance->now.c, kinds, rate);
 }
 
-Status rate_on_the_way(Instance *instance, const double p[], const double c[], double rate[3]) {
+Status rate_on_the_way(Instance *instance, const double p[], const double c[], double rate[RATE_COUNT]) {
     Stage stage;
     Status status = STATUS_OK;
     first_stage(&stage, instance->now.stepped_p, instance->now.kept_c, p);

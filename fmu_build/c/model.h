@@ -6,15 +6,16 @@
      p [INPUT_P_COUNT]    inputs that shape the composite, directions scaled
      k [INPUT_K_COUNT]    motion at contact: m/s, rad/s
      u [INPUT_U_COUNT]    torques, N.m, and forces, N
-     x [STATE_COUNT]      attitude w, x, y, z; angular velocity, rad/s
-     z [STATE_COUNT]      states of model exchange: x, or attitude and angular momentum, N.m.s
+     x [STATE_COUNT]      attitude w, x, y, z; angular velocity, rad/s; momenta of wheels, N.m.s
+     z [STATE_COUNT]      states of model exchange: x, or angular momentum, N.m.s, in place of angular velocity
      c, d [COMPOSITE_COUNT]  composites
      a [AXES_COUNT]       principal moments and axes
      e [2]                estimated error of the last communication step, and bound of the error, rad
      b [3]                bound of the error: angle, rad; of the rate, energy norm, J^(1/2), and length, rad/s
      s [4]                a sub-step: its size, s; one more than its order, 0: free; its error estimated, rad and rad/s
      y [OUTPUT_COUNT]     outputs
-     omega, momentum [3]  rad/s, N.m.s
+     omega, momentum [3]  rad/s, N.m.s; as arguments of changes, but for dH, with momenta of wheels behind them,
+                          [RATE_COUNT]
      h, t                 times, s
    A small change of a quantity has d before its name, a weight on it w. */
 #ifndef MODEL_H

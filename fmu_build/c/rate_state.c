@@ -25,7 +25,7 @@ Status exchange_check_continuous(Instance *instance, const double p[]) {
     return STATUS_OK;
 }
 
-void exchange_take_rate(Instance *instance, const double rate[3]) {
+void exchange_take_rate(Instance *instance, const double rate[RATE_COUNT]) {
     memcpy(instance_x(instance) + 4, rate, 3 * sizeof(double));
 }
 
@@ -42,14 +42,14 @@ bool exchange_follows(const Instance *instance) {
     return true;
 }
 
-void exchange_forward(Instance *instance, const double change[3], Variation *v) {
+void exchange_forward(Instance *instance, const double change[RATE_COUNT], Variation *v) {
     (void)instance;
     for (size_t i = 0; i < 3; i++) v->x[4 + i] += change[i];
 }
 
-void exchange_reverse(Instance *instance, const Variation *v, double weight[3], double on_composite[]) {
+void exchange_reverse(Instance *instance, const Variation *v, double weight[RATE_COUNT], double on_composite[]) {
     (void)instance, (void)on_composite;
-    memcpy(weight, v->x + 4, 3 * sizeof(double));
+    memcpy(weight, v->x + 4, RATE_COUNT * sizeof(double));
 }
 
 void changes_start_forward(Instance *instance, Variation *v) {

@@ -20,6 +20,6 @@ bool move_stage(Stage *stage, const double p[], unsigned kinds);
 Status weigh_stage(Instance *instance, Stage *stage);
 
 /* Lets inputs of some kinds be as they are now; the rate [rad/s] follows, keeping the momentum; kept_momentum.c has it. */
-Status move_keeping_momentum(Instance *instance, Stage *stage, unsigned kinds, double rate[3]);
+Status move_keeping_momentum(Instance *instance, Stage *stage, unsigned kinds, double rate[RATE_COUNT]);
 
 #endif

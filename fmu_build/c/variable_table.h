@@ -15,7 +15,8 @@ typedef enum {
     CHECK_NONE,
     CHECK_MASS,   /* >= 0 */
     CHECK_PMI,    /* three moments >= 0; unless the scene says otherwise they obey the triangle inequality */
-    CHECK_PORT    /* direction[3] and alignment[3]: lengths > 0, not parallel */
+    CHECK_PORT,   /* direction[3] and alignment[3]: lengths > 0, not parallel */
+    CHECK_MASS_OF_WHEELS /* > 0 */
 } Check;
 
 /* What must be current before a variable is read, as bits. */

@@ -11,6 +11,7 @@
 #include "changes.h"
 #include "field.h"
 #include "model.h"
+#include "motors.h"
 
 /* Squares of the attitude's length beyond which it cannot be brought to unit length. */
 static const double SMALLEST_SQUARE = 1e-200;
@@ -89,6 +90,7 @@ static Status prepare(Instance *instance, unsigned wanted) {
     if (status == STATUS_OK && (wanted & FOLLOWS_AXES)) composite_refresh_axes(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_OUTPUTS)) status = refresh_outputs(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_RATES)) status = field_check(instance);
+    if (status == STATUS_OK && (wanted & FOLLOWS_RATES)) status = motors_check(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_RATES)) status = refresh_rates(instance);
     return status;
 }

@@ -89,6 +89,8 @@ static Status make_step(Instance *instance, const double *const arg[]) {
     bool ended_early;
     Status status = set_in_order(instance, REFERENCE_ATTITUDE_START, 4, x);
     if (status == STATUS_OK) status = set_in_order(instance, REFERENCE_RATE_START, 3, x ? x + 4 : NULL);
+    if (status == STATUS_OK)
+        status = set_in_order(instance, REFERENCE_ATTITUDE_START + 4, STATE_COUNT - 7, x ? x + 7 : NULL);
     if (status == STATUS_OK) status = set_in_order(instance, REFERENCE_P, INPUT_COUNT, arg[2]);
     if (status == STATUS_OK) status = set_in_order(instance, REFERENCE_TORQUE, INPUT_U_COUNT, arg[1]);
     if (status == STATUS_OK) status = instance_exit_initialization(instance);

@@ -105,6 +105,12 @@ def reference_flight(model: Equations) -> ReferenceFlight | None:
     return None
 
 
+def state_at_start(scene: Scene) -> Array:
+    """Returns attitude, angular velocity [rad/s] and momenta of wheels [N m s] at the start, (7 + n,)."""
+    momenta = (scene.wheel(name).momentum for name in scene.wheels)
+    return np.array([*scene.rotation.attitude, *scene.rotation.angular_velocity, *momenta])
+
+
 def exchange_flight(model: Equations, stimuli: Stimuli) -> tuple[Array, Array]:
     """Returns times [s], (n,), and outputs, (n, outputs), of a flight in model exchange.
 
@@ -112,7 +118,7 @@ def exchange_flight(model: Equations, stimuli: Stimuli) -> tuple[Array, Array]:
     there are two rows, before and after it. Integrated by classical Runge-Kutta in steps of EXCHANGE_ANGLE.
     """
     scene, change = model.resolved.scene, _change(model)
-    x = np.array([*scene.rotation.attitude, *scene.rotation.angular_velocity])
+    x = state_at_start(scene)
     times, rows = [0.0], [_outputs(model, x, stimuli.at(0.0))]
     for begin, end in pairwise(stimuli.times):
         x = _integrated(model, stimuli.within(begin, end), x, (begin, end))
@@ -257,7 +263,13 @@ def _change(model: Equations) -> ca.Function | None:
     """Returns the function omega, p before, p after, k -> omega of a change of inputs; None: it stays."""
     if model.change is None:
         return None
-    sizes = {"omega": 3, "before": len(model.names.p), "after": len(model.names.p), "k": len(model.names.k)}
+    rates = 3 + len(model.resolved.scene.wheels)
+    sizes = {
+        "omega": rates,
+        "before": len(model.names.p),
+        "after": len(model.names.p),
+        "k": len(model.names.k),
+    }
     symbols = tuple(ca.SX.sym(name, size) for name, size in sizes.items())
     margins = composite_slices()["margins"]
     omega = followed(model.resolved, model.change, model.composite, margins, symbols)
@@ -271,7 +283,7 @@ def _changed(model: Equations, change: ca.Function | None, x: Array, inputs: tup
     p = len(model.names.p)
     before, after = inputs
     k = after[p : len(after) - len(model.names.u)]
-    return np.concatenate([x[:4], np.array(change(x[4:], before[:p], after[:p], k)).ravel()])
+    return np.concatenate([x[:4], np.array(change(x[4:], before[:p], after[:p], k)).ravel(), x[7:]])
 
 
 def _composite(model: Equations, inputs: Array) -> Array:
@@ -292,7 +304,7 @@ def _fly(model: Equations, stimuli: Stimuli, change: ca.Function | None) -> Arra
     None if that takes more than MOST_SUB_STEPS.
     """
     scene = model.resolved.scene
-    x = np.array([*scene.rotation.attitude, *scene.rotation.angular_velocity])
+    x = state_at_start(scene)
     held, taken = stimuli.at(0.0), 0
     rows = [_outputs(model, x, held)]
     for time in stimuli.times[:-1]:

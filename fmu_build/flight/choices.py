@@ -68,7 +68,8 @@ class Choice:
 
 def laws_of(scene: Scene) -> list[Law]:
     """Returns the laws that make sense in a scene, cheapest first."""
-    return [law for law in LAWS_TRIED if not (law == "none" and scene.inputs.motion)]
+    moves = scene.inputs.motion or scene.wheels
+    return [law for law in LAWS_TRIED if not (law == "none" and moves)]
 
 
 def models(scene: Scene, *, quick: bool) -> list[Model]:
@@ -110,7 +111,7 @@ def is_free(scene: Scene, model: Model) -> bool:
         if len({value for _, value in rows}) > 1
     ]
     frozen = all(change != "" and change == model.frozen for change in moved)
-    return frozen and not acts(scene) and not scene.inputs.motion
+    return frozen and not acts(scene) and not scene.inputs.motion and not scene.wheels
 
 
 def ways_to(scene: Scene, model: Model) -> list[Choice]:
@@ -163,7 +164,8 @@ def always_free() -> list[str]:
 def _suiting(scene: Scene, model: Model) -> list[tuple[str, Propagator]]:
     """Returns the methods that make sense with a scene's inputs under a model, by name."""
     inputs = dict(scene.inputs)
-    return [(name, row) for name, row in PROPAGATORS.items() if not row.suits(model.law, inputs)]
+    wheels = bool(scene.wheels)
+    return [(n, row) for n, row in PROPAGATORS.items() if not row.reason_against(model.law, inputs, wheels)]
 
 
 def by_angle(model: Model, *, quick: bool) -> list[Choice]:

@@ -10,6 +10,7 @@ from fmu_build.generate.scene_header import scene_header
 from fmu_build.generate.scene_source import scene_source
 from fmu_build.generate.sources import digest, layer_files_of, source_file_names, source_files
 from fmu_build.generate.vessel_loop import loop_functions, loop_source, loop_tables
+from fmu_build.generate.wheel_tables import wheel_tables
 from fmu_build.interface.model_description import model_description
 from fmu_build.interface.variable_table import TableEntry, variable_table
 from fmu_build.versions import VERSIONS
@@ -38,11 +39,11 @@ def generated(model: Equations, entries: Sequence[TableEntry], fmi: int) -> tupl
     scene, changing = model.resolved.scene, model.change is not None
     loop = loop_tables(model)
     functions = model.functions if loop is None else loop_functions(model)
-    tables = change_tables(model) + loop_source(loop)
+    tables = change_tables(model) + wheel_tables(model) + loop_source(loop)
     sources = layer_files_of(picked_files(model, loop is not None)) | {
         "model.c": model_source(functions),
         "scene.h": scene_header(model, entries, functions, loop),
-        "scene.c": scene_source(entries, "", changing) + tables,
+        "scene.c": scene_source(scene, entries, "", changing) + tables,
     }
     if loop is not None:
         sources["lane_kernels.h"] = loop_steps(scene)

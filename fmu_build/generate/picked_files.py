@@ -1,5 +1,6 @@
 """The choice of files of the C layer: some are in every FMU, the others only where the scene needs them."""
 
+from fmu_build.generate.wheel_tables import wheel_constants
 from supervessel.equations import Equations
 from supervessel.rotation.error_bound.functions import keeps_in_truth
 from supervessel.rotation.propagators import PROPAGATORS, WHEN_FREE
@@ -24,14 +25,15 @@ CHANGES = frozenset(
 )
 BOUND = frozenset({"error_bound"})
 STAGES = frozenset({"stages"})
+MOTORS = frozenset({"motors"})
 FIELD = frozenset({"field"})
 FIELD_SERIES = frozenset({"gradient_series"})
 STEPS = frozenset(WHEN_FREE.values()).union(*(method.c_files for method in PROPAGATORS.values()))
 
-PICKED = LOOP | BOOLEANS | CHANGES | BOUND | STAGES | FIELD | FIELD_SERIES | STEPS
+PICKED = LOOP | BOOLEANS | CHANGES | BOUND | STAGES | MOTORS | FIELD | FIELD_SERIES | STEPS
 """Names, without .c and .h, of the files that are not in every FMU, HEADERS excepted."""
 
-HEADERS = frozenset({"changes.h", "error_bound.h", "docks.h", "booleans.h", "field.h"})
+HEADERS = frozenset({"changes.h", "error_bound.h", "docks.h", "booleans.h", "motors.h", "field.h"})
 """Headers with such names that are in every FMU, because other files include them."""
 
 
@@ -55,6 +57,7 @@ def picked_files(model: Equations, has_loop: bool) -> frozenset[str]:
         | bound
         | stages
         | _for_field(model)
+        | (MOTORS if wheel_constants(model) else frozenset())
         | (LOOP if has_loop else frozenset())
     )
 

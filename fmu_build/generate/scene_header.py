@@ -6,6 +6,7 @@ import casadi as ca
 
 from fmu_build.generate.change_tables import change_constants
 from fmu_build.generate.vessel_loop import LoopTables, loop_constants
+from fmu_build.generate.wheel_tables import wheel_constants
 from fmu_build.interface.model_description import LOG_CATEGORIES, tells_accuracy
 from fmu_build.interface.names import INDEX_MARKS
 from fmu_build.interface.variable_table import TableEntry
@@ -46,6 +47,7 @@ def scene_header(
     macros = {
         "AXES_COUNT": model.axes.numel_out(0),
         **change_constants(model),
+        **wheel_constants(model),
         **loop_constants(loop),
         **_bound(model),
         **_field(model),
@@ -79,7 +81,7 @@ def _variables(model: Equations, entries: Sequence[TableEntry]) -> dict[str, int
         "REFERENCE_TORQUE": 1 + p + k,
         "REFERENCE_RATE_START": references["angular_velocity_start[1]"],
         "REFERENCE_ATTITUDE_START": references["attitude_start[1]"],
-        "REFERENCE_OUTPUTS": 1 + p + k + u + 7,
+        "REFERENCE_OUTPUTS": 1 + p + k + u + len(model.resolved.parameters),
         "OUTPUT_COUNT": len(model.names.y),
         "REFERENCE_STATES": references["state.attitude[1]"],
         "REFERENCE_DERIVATIVES": references["der(state.attitude[1])"],

@@ -3,10 +3,12 @@
 from collections.abc import Mapping, Sequence
 
 from fmu_build.interface.variable_table import TableEntry
+from supervessel.scene.inputs import MASS
+from supervessel.scene.schema import Scene
 from supervessel.scene.variables import InputVariable, OutputVariable, Variable
 
 
-def scene_source(entries: Sequence[TableEntry], token: str, changing: bool) -> str:
+def scene_source(scene: Scene, entries: Sequence[TableEntry], token: str, changing: bool) -> str:
     """Returns scene.c.
 
     token    : instantiation token
@@ -14,7 +16,9 @@ def scene_source(entries: Sequence[TableEntry], token: str, changing: bool) -> s
     """
     needs = {entry.reference: _needs(entry, changing) for entry in entries}
     rows = "\n".join(f"    {_row(entry, needs)}," for entry in entries)
-    checks = [(entry.reference, check) for entry in entries if (check := _check(entry)) != "CHECK_NONE"]
+    checks = [
+        (entry.reference, check) for entry in entries if (check := _check(scene, entry)) != "CHECK_NONE"
+    ]
     judged = "\n".join(f"    {{{reference}, {check}}}," for reference, check in [*checks, (0, "CHECK_NONE")])
     return (
         "/* Generated: the scene's variables, by value reference. */\n"
@@ -32,6 +36,8 @@ def _needs(entry: TableEntry, changing: bool) -> frozenset[str]:
     """
     if entry.role == "state" and "attitude" in entry.variable.name:
         return frozenset({"STATES", "ATTITUDE"})
+    if entry.role == "state" and entry.variable.group.endswith(".momentum"):  # of a wheel
+        return frozenset({"STATES"})
     if entry.role == "state":
         return frozenset({"STATES", "COMPOSITE"} if changing else {"STATES"})
     if isinstance(entry.variable, InputVariable) and entry.variable.part == "shape":
@@ -68,9 +74,11 @@ def _row(entry: TableEntry, needs: Mapping[int, frozenset[str]]) -> str:
     return "{" + ", ".join(fields) + "}"
 
 
-def _check(entry: TableEntry) -> str:
+def _check(scene: Scene, entry: TableEntry) -> str:
     """Returns the check of a variable's value; where elements are judged together, the first one has it."""
     variable = entry.variable
+    if isinstance(variable, InputVariable) and variable.kind is MASS and scene.vessels[variable.owner].wheels:
+        return "CHECK_MASS_OF_WHEELS"
     if isinstance(variable, InputVariable) and variable.element == 0 and variable.kind.judge:
         return f"CHECK_{variable.kind.judge}"
     return "CHECK_NONE"

@@ -7,12 +7,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from supervessel.composite.anchors import from_anchor
 from supervessel.composite.chain import kernels
 from supervessel.composite.constants import seen_in_group
 from supervessel.composite.docks import Joint
 from supervessel.composite.inertia import UPPER_TRIANGLE
-from supervessel.composite.poses import scaled
+from supervessel.composite.poses import from_anchor, scaled
 from supervessel.composite.resolved import ResolvedScene, RigidGroup
 from supervessel.equations import Equations
 from supervessel.scene.inputs import vessel_of
@@ -104,11 +103,13 @@ def loop_tables(model: Equations) -> LoopTables | None:
 def _suits_loop(model: Equations) -> bool:
     """Whether the composite is long enough for a loop, and made of steps that the loop has.
 
-    The loop has no docks that open, no ports that move, no forces at points, and it keeps nothing of single
-    vessels: that is for straight code alone.
+    The loop has no docks that open, no ports that move, no forces at points, no wheels, and it keeps nothing
+    of single vessels: that is for straight code alone.
     """
     inputs = model.resolved.scene.inputs
-    beyond = inputs.docked or inputs.motion or inputs.force or inputs.vessel_torque
+    beyond = (
+        inputs.docked or inputs.motion or inputs.force or inputs.vessel_torque or model.resolved.scene.wheels
+    )
     return not (beyond or model.resolved.vessels_shown or model.composite.n_instructions() <= LONGEST_CODE)
 
 

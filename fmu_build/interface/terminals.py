@@ -77,6 +77,7 @@ CONNECTIONS: dict[str, Connection | None] = {
     "pmi": None,
     "pose": Connection("port_pose", "pose of docking port {owner} in the axes of {vessel}"),
     "docked": Connection("dock", "whether {ports} are docked, motion at contact"),
+    "wheel": Connection("motor", "torque of the motor of wheel {owner}, along its axis", "{owner}.motor"),
     "force": Connection("force", "external force at {owner}, axes of its vessel"),
     "vessel_torque": Connection("torque", "external torque on {owner}, its axes", "{owner}.torque"),
     "gravity": Connection("orbit", "place and velocity from the attracting centre, inertial axes", "gravity"),

@@ -86,7 +86,8 @@ def variable_table(model: Equations, naming: Naming = "structured") -> tuple[Tab
     }
     first = _first_references(groups)
     inputs = list(enumerate(resolved.inputs, start=first["input"]))
-    knowns = [*range(first["state"], first["state"] + 7), *(reference for reference, _ in inputs)]
+    states = range(first["state"], first["state"] + len(resolved.states))
+    knowns = [*states, *(reference for reference, _ in inputs)]
     booleans = frozenset(reference for reference, variable in inputs if variable.boolean)
     by_role, at_start = _dependencies(model, knowns, booleans)
     whole = magnitudes_at_start(resolved.scene)
@@ -95,7 +96,7 @@ def variable_table(model: Equations, naming: Naming = "structured") -> tuple[Tab
         for i, variable in enumerate(variables):
             now = by_role[role][i] if role in by_role else ()
             start = at_start[role][i] if role in at_start else ()
-            initial = _at_start(start, first["state"], first["parameter"])
+            initial = _at_start(start, states, first["parameter"])
             nominal = nominal_of(variable, whole)
             entries.append(TableEntry(variable, first[role] + i, role, nominal, now, initial, naming))
     return tuple(entries)
@@ -107,11 +108,13 @@ def _with_starts(model: Equations) -> list[Variable]:
     The FMU computes them at initialisation. Importers that set up a problem of their own, as CasADi's does,
     begin from them: without them from a quaternion of zeros.
     """
-    rotation, kept = model.resolved.scene.rotation, ca.DM(model.resolved.scene.rotation.angular_velocity)
-    if keeps_momentum(model.resolved.scene):
+    scene = model.resolved.scene
+    rotation, momenta = scene.rotation, [scene.wheel(name).momentum for name in scene.wheels]
+    kept = ca.DM(rotation.angular_velocity)
+    if keeps_momentum(scene):
         assert model.change is not None
-        kept = model.change.momentum_of(kept, model.composite(p_start(model.resolved.scene)))
-    starts = (*rotation.attitude, *kept.elements())
+        kept = model.change.momentum_of(ca.vertcat(kept, *momenta), model.composite(p_start(scene)))
+    starts = (*rotation.attitude, *kept.elements(), *momenta)
     return [replace(state, start=value) for state, value in zip(model.resolved.states, starts, strict=True)]
 
 
@@ -136,9 +139,8 @@ def _dependencies(model: Equations, knowns: Sequence[int], booleans: Set[int]) -
     booleans : the value references among them that are Booleans
     """
     names = model.names
-    p, k, u, z = (
-        ca.SX.sym(*s) for s in (("p", len(names.p)), ("k", len(names.k)), ("u", len(names.u)), ("z", 7))
-    )
+    sizes = (("p", len(names.p)), ("k", len(names.k)), ("u", len(names.u)), ("z", len(names.z)))
+    p, k, u, z = (ca.SX.sym(*size) for size in sizes)
     c = model.composite(p)
     # principal moments and axes follow from every element of the inertia, and not linearly
     a = ca.repmat(ca.sumsqr(c[model.slices.composite["inertia"]]), model.axes.numel_out(0))
@@ -157,15 +159,14 @@ def _dependencies(model: Equations, knowns: Sequence[int], booleans: Set[int]) -
     )
     if model.change is None:
         return now, now | rows({"state": z})
-    begun = (
-        ca.vertcat(z[:4], model.change.momentum_of(z[4:], c)) if keeps_momentum(model.resolved.scene) else z
-    )
+    by_momentum = keeps_momentum(model.resolved.scene)
+    begun = ca.vertcat(z[:4], model.change.momentum_of(z[4:], c), z[7:]) if by_momentum else z
     rate = ca.vertcat(model.ode(z, u, c)[:4], model.exchange.ode(begun, u, c)[4:])
     return now, rows({"output": model.outputs(z, u, c, a, 0.0), "derivative": rate, "state": begun})
 
 
 def _after_change(model: Equations, z: ca.SX, inputs: tuple[ca.SX, ca.SX], c: ca.SX) -> ca.SX:
-    """Returns an expression whose structure shows what the states depend on after a change of inputs, (7,).
+    """Returns an expression whose structure shows what the states depend on after a change of inputs, as z.
 
     inputs : p and k
     Only its structure has a meaning. An angular momentum is kept when a mass or a pose changes. An angular
@@ -178,15 +179,15 @@ def _after_change(model: Equations, z: ca.SX, inputs: tuple[ca.SX, ca.SX], c: ca
     if change is None:
         return z
     by_momentum = keeps_momentum(scene)
-    kept, jump = ca.SX.sym("kept", 3), ca.SX.zeros(3)
+    kept, jump = ca.SX.sym("kept", z.numel() - 4), ca.SX.zeros(3)
     if "momentum" in scene.keeps.values() and not by_momentum:
         jump += change.keep_momentum(kept, ca.SX.sym("before", c.numel()), c)
     if scene.inputs.docked:
         docked = change.docked_rate(kept, change.contact_momentum(p, k), c)
-        jump += change.momentum_of(docked, c) if by_momentum else docked
+        jump += change.momentum_of(ca.vertcat(docked, kept[3:]), c) if by_momentum else docked
         shaping = zip(model.resolved.shaping, ca.vertsplit(p), strict=True)
         jump += sum((flag for variable, flag in shaping if variable.boolean), ca.SX(0))
-    return ca.vertcat(z[:4], z[4:] + ca.SX.sym("scale") * jump)
+    return ca.vertcat(z[:4], z[4:7] + ca.SX.sym("scale") * jump, z[7:])
 
 
 def _rows(
@@ -225,23 +226,25 @@ def _rows_by_structure(
     return rows
 
 
-def _at_start(now: Iterable[Dependency], first_state: int, first_parameter: int) -> tuple[Dependency, ...]:
-    """Returns dependencies with attitude and rate replaced by the start parameters that they follow from.
+def _at_start(now: Iterable[Dependency], states: range, first_parameter: int) -> tuple[Dependency, ...]:
+    """Returns dependencies with the states replaced by the start parameters that they follow from.
 
-    The attitude follows from all four of attitude_start, which are normalised, the rate from its own element.
+    states : their value references
+    The attitude follows from all four of attitude_start, which are normalised, each other one from its own.
     """
-    rates, attitude = (
-        range(first_parameter, first_parameter + 3),
-        range(first_parameter + 3, first_parameter + 7),
+    attitude = range(first_parameter + 3, first_parameter + 7)
+    own = (
+        *range(first_parameter, first_parameter + 3),
+        *range(attitude.stop, attitude.stop + len(states) - 7),
     )
     parameters: dict[int, Dependency] = {}
     others = []
     for dependency in now:
-        state = dependency.reference - first_state
-        if not 0 <= state < 7:
+        if dependency.reference not in states:
             others.append(dependency)
-        elif state < 4:
+        elif dependency.reference < states[4]:
             parameters |= {reference: Dependency(reference, "dependent") for reference in attitude}
         else:
-            parameters[rates[state - 4]] = Dependency(rates[state - 4], dependency.kind)
+            parameter = own[dependency.reference - states[4]]
+            parameters[parameter] = Dependency(parameter, dependency.kind)
     return tuple(sorted([*others, *parameters.values()], key=lambda dependency: dependency.reference))

@@ -6,9 +6,10 @@ Symbols, each a column vector; units and axes are those of the FMU's variables:
     k : the motion with which parts dock, velocities [m/s] and rates [rad/s]
     u : the inputs that torques follow from: torques [N m] and forces [N], then position [m] and velocity
         [m/s] in a field of gravity
-    x : the state, (7,): attitude q_inertial_body, angular velocity [rad/s], body axes
-    z : the state of model exchange, (7,): x, or attitude and angular momentum [N m s], body axes, where every
-        change of inputs keeps the momentum; see `rotation.exchange`
+    x : the state, (7 + n,): attitude q_inertial_body, angular velocity [rad/s], body axes, and momentum of
+        each of n wheels along its axis [N m s]
+    z : the state of model exchange, (7 + n,): x, or angular momentum [N m s], body axes, in place of angular
+        velocity where every change of inputs keeps it; see `rotation.exchange`
     c : everything that follows from p alone, see `composite.parts`
     a : principal moments and axes, which follow from c, see `rotation.axes`
     e : (2,) [rad], estimated error of the last communication step, and bound of the error since the start,
@@ -170,7 +171,9 @@ def equations(scene: Scene) -> Equations:
     """
     plan, resolved = plan_of(scene), resolve(scene)
     names, graph = _names(resolved), composite_graph(resolved)
-    k, u, x = (ca.SX.sym(*s) for s in (("k", len(names.k)), ("u", len(names.u)), ("x", 7)))
+    k, u, x = (
+        ca.SX.sym(*s) for s in (("k", len(names.k)), ("u", len(names.u)), ("x", 7 + len(scene.wheels)))
+    )
     c = ca.SX.sym("c", graph.c.numel())
     parts = graph.parts(c)
     dynamics = dynamics_of(resolved, parts, u)

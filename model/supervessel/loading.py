@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from supervessel.composite.docks import TooManyWaysError
 from supervessel.composite.resolved import resolve
-from supervessel.composite.start import composite_at_start, principal_moments
+from supervessel.composite.start import composite_at_start, principal_moments, turning_at_start
 from supervessel.orbit import orbit_problem
 from supervessel.problems import SceneError, few_suggestions, key_path, quantity, unknown
 from supervessel.scene.consistency import consistency_problems
@@ -157,6 +157,7 @@ def _composite_problems(scene: Scene) -> list[str]:
     law = scene.rotation.law
     if law == "none" or (np.all(c["margins"] > 0.0) and np.all(np.isfinite(c["law"]))):
         return []
-    three = ", ".join(f"{moment:.10g}" for moment in principal_moments(c["inertia"]))
+    three = ", ".join(f"{moment:.10g}" for moment in principal_moments(turning_at_start(scene, c)))
     allowed = f'must be positive beyond rounding for rotation.law = "{law}"'
-    return [f"vessels: the composite has principal moments {three} kg m2: {allowed}"]
+    without = " without what its wheels have about their axes" if scene.wheels else ""
+    return [f"vessels: the composite{without} has principal moments {three} kg m2: {allowed}"]

@@ -9,6 +9,13 @@ import casadi as ca
 from supervessel.composite.actions import net_force, vessel_outputs
 from supervessel.composite.inertia import from_upper_triangle
 from supervessel.composite.resolved import ResolvedScene
+from supervessel.composite.wheels import (
+    WheelAxes,
+    axes_of,
+    free_inertia,
+    momentum_of_vessel,
+    wheel_outputs,
+)
 from supervessel.rotation.attitude import to_inertial, unit
 
 
@@ -23,6 +30,8 @@ class Known:
     parts    : by name, the parts of c, see `composite.parts`; "principal", the part of a, (7,), zeros where
                no output shows it; "error_estimate" and "error_bound" [rad]
     inertia  : J about the barycentre, (3, 3) [kg m2], body axes
+    wheels   : see `composite.wheels`; None where there are none
+    stored   : momentum of each wheel, (n,) [N m s]
     """
 
     resolved: ResolvedScene
@@ -31,17 +40,21 @@ class Known:
     u: ca.SX
     parts: Mapping[str, ca.SX]
     inertia: ca.SX
+    wheels: WheelAxes | None
+    stored: ca.SX
 
     @cached_property
     def turned(self) -> ca.SX:
-        """J omega, (3,) [N m s], body axes: the angular momentum without that of moving parts, h."""
-        return self.inertia @ self.omega
+        """(J - A) omega, (3,) [N m s], body axes: the angular momentum without moving parts and wheels."""
+        return free_inertia(self.inertia, self.wheels) @ self.omega
 
 
 def _momentum(known: Known) -> ca.SX:
-    """Returns J omega + h, (3,) [N m s], inertial axes."""
+    """Returns (J - A) omega + h + sum of h_w b_w, (3,) [N m s], inertial axes."""
     turned, parts = known.turned, known.parts
     momentum = turned + parts["momentum"][:3] if "momentum" in parts else turned
+    if known.wheels is not None:
+        momentum += known.wheels.axes @ known.stored
     return to_inertial(known.attitude, momentum)
 
 
@@ -69,19 +82,21 @@ EXPRESSIONS: dict[str, Callable[[Known], ca.SX]] = {
 def outputs_of(resolved: ResolvedScene, x: ca.SX, u: ca.SX, parts: Mapping[str, ca.SX]) -> ca.SX:
     """Returns the scene's outputs in its order, y, (n,).
 
-    x     : attitude q_inertial_body and angular velocity [rad/s], body axes, (7,)
+    x     : attitude q_inertial_body, angular velocity [rad/s], body axes, and momenta of wheels [N m s]
     u     : the inputs that act, (m,) [N m, N]
     parts : see `Known`
     The attitude is brought to unit length here: as a state it keeps its length only as accurately as it is
     integrated.
     """
-    attitude, omega = unit(x[:4]), x[4:]
-    known = Known(resolved, attitude, omega, u, parts, from_upper_triangle(parts["inertia"]))
-    of_vessels: dict[str, ca.SX] = {}
+    attitude, omega, stored, wheels = unit(x[:4]), x[4:7], x[7:], axes_of(resolved, parts)
+    inertia = from_upper_triangle(parts["inertia"])
+    known = Known(resolved, attitude, omega, u, parts, inertia, wheels, stored)
+    of_owners = {} if wheels is None else wheel_outputs(resolved, wheels, omega, stored)
     for name in resolved.vessels_shown:
-        of_vessels |= vessel_outputs(name, parts[f".{name}"], attitude, omega)
+        held = momentum_of_vessel(resolved.scene, wheels, name, stored)
+        of_owners |= vessel_outputs(name, parts[f".{name}"], attitude, omega, held)
     shown = (
-        of_vessels[group] if group in of_vessels else EXPRESSIONS[group](known)
+        of_owners[group] if group in of_owners else EXPRESSIONS[group](known)
         for group in resolved.scene.outputs.names
     )
     return ca.densify(ca.vertcat(*shown))

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from supervessel.composite.anchors import from_anchor
 from supervessel.composite.bodies import Lookup, placed_groups, vessel_body
 from supervessel.composite.inertia import Body, from_upper_triangle, offset_tensor, upper_triangle
-from supervessel.composite.poses import Pose, constant
+from supervessel.composite.poses import Pose, constant, from_anchor
 from supervessel.composite.resolved import ResolvedScene
+from supervessel.composite.wheels import free_inertia, wheels_on, without_locked
 from supervessel.layout import slices_of
 from supervessel.rotation.attitude import quaternion, to_inertial
-from supervessel.scene.inputs import FORCE, TORQUE, InputKind, vessel_of
+from supervessel.scene.inputs import FORCE, TORQUE, WHEEL_TORQUE, InputKind, vessel_of
 from supervessel.scene.schema import Scene
 from supervessel.scene.variables import InputVariable
 
@@ -100,12 +100,21 @@ def action_parts(resolved: ResolvedScene, lookup: Lookup, centre: ca.SX) -> dict
 
 
 def _acting(resolved: ResolvedScene) -> list[tuple[int, InputVariable]]:
-    """Returns of each input that acts its place in u and the variable of its first element."""
-    return [(place, variable) for place, variable in enumerate(resolved.acting) if variable.element == 0]
+    """Returns of each force or torque on the body its place in u and the variable of its first element.
+
+    Motors of wheels are none: see `composite.wheels.motor_torques`.
+    """
+    return [
+        (place, variable)
+        for place, variable in enumerate(resolved.acting)
+        if variable.element == 0 and variable.kind is not WHEEL_TORQUE
+    ]
 
 
 def torque_about_barycentre(resolved: ResolvedScene, parts: Mapping[str, ca.SX], u: ca.SX) -> ca.SX:
     """Returns the sum M of all torques about the barycentre, those of forces included, (3,) [N m], body axes.
+
+    Without the torques of motors, which act between parts of the body.
 
     parts : the parts of c by name, see `action_parts`
     u     : the inputs that act, (m,) [N m, N]
@@ -142,9 +151,10 @@ origin   : origin of the vessel axes [m], body axes
 centre   : the vessel's centre of mass [m], body axes
 rotation : R_body_vessel, column by column
 rate     : angular velocity of the vessel relative to body axes [rad/s], body axes
-inertia  : of the vessel about the barycentre of the composite [kg m2], body axes, xx, yy, zz, xy, xz, yz
+inertia  : of the vessel, less A of its wheels, about the barycentre of the composite [kg m2], body axes, xx,
+           yy, zz, xy, xz, yz
 spin     : angular momentum of the vessel's motion relative to body axes, about the barycentre [N m s], body
-           axes
+           axes, its wheels' along their axes left out
 """
 
 
@@ -161,20 +171,27 @@ def vessel_parts(resolved: ResolvedScene, lookup: Lookup, whole: Body) -> dict[s
         pose, attached = where[name]
         body = vessel_body(resolved.scene, name, lookup, Pose(ca.SX.eye(3), ca.SX.zeros(3)))
         origin = constant(from_anchor(resolved.scene, name, np.zeros(3)))
-        part = _vessel_part(body, pose, origin, whole)
+        seen = body.seen_from(pose.rotation, pose.origin, pose.velocity, pose.rate)
+        part = _vessel_part(_free_of_wheels(resolved.scene, name, seen, pose), pose, origin, whole)
         parts[f".{name}"] = part if attached is None else attached * part
     return parts
 
 
-def _vessel_part(body: Body, pose: Pose, origin: ca.SX, whole: Body) -> ca.SX:
+def _free_of_wheels(scene: Scene, name: str, seen: Body, pose: Pose) -> Body:
+    """Returns a vessel, in root axes, with J - A for its tensor J."""
+    wheels = wheels_on(scene, name, pose)
+    body = without_locked(seen, wheels)
+    return Body(body.mass, body.centre, free_inertia(body.inertia, wheels), body.velocity, body.spin)
+
+
+def _vessel_part(seen: Body, pose: Pose, origin: ca.SX, whole: Body) -> ca.SX:
     """Returns the part of c, (28,), of a docked vessel, in the layout of SIZES.
 
-    body   : the vessel in its own axes, from its anchor
+    seen   : the vessel in the root's axes
     pose   : of the vessel in the root's axes, its origin the anchor
     origin : (3,) [m], of its axes, from its anchor
     whole  : the composite as one body
     """
-    seen = body.seen_from(pose.rotation, pose.origin, pose.velocity, pose.rate)
     rho = seen.centre - whole.centre
     inertia = seen.inertia + seen.mass * offset_tensor(rho)
     spin, rate = ca.SX.zeros(3), ca.SX.zeros(3)
@@ -187,16 +204,20 @@ def _vessel_part(body: Body, pose: Pose, origin: ca.SX, whole: Body) -> ca.SX:
     return ca.vertcat(1.0, place, rho, R_body_vessel, rate, upper_triangle(inertia), spin)
 
 
-def vessel_outputs(name: str, part: ca.SX, attitude: ca.SX, omega: ca.SX) -> dict[str, ca.SX]:
+def vessel_outputs(
+    name: str, part: ca.SX, attitude: ca.SX, omega: ca.SX, stored: ca.SX | None
+) -> dict[str, ca.SX]:
     """Returns the outputs of a vessel by name; `scene.outputs` says what they are, with units and axes.
 
     part     : the vessel's part of c, (28,), in the layout of SIZES
     attitude : q_inertial_body, (4,), of unit length
     omega    : angular velocity of the body, (3,) [rad/s], body axes
+    stored   : momentum of the vessel's wheels, (3,) [N m s], body axes; None: it has none
     """
     pieces = {key: part[place] for key, place in slices_of(SIZES).items()}
     R_body_vessel = ca.reshape(pieces["rotation"], 3, 3)
     share = from_upper_triangle(pieces["inertia"]) @ omega + pieces["spin"]
+    share = share if stored is None else share + stored
     if pieces["docked"].is_constant():
         q_body_vessel = quaternion(R_body_vessel)
     else:

@@ -14,11 +14,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from supervessel.composite.anchors import from_anchor
 from supervessel.composite.constants import Places
 from supervessel.composite.docks import Joint, Way
 from supervessel.composite.inertia import Body, combine, orbiter_moments, placed_body, symmetric
-from supervessel.composite.poses import Pose, constant, mated_pose, port_axes, scaled
+from supervessel.composite.poses import Pose, constant, from_anchor, mated_pose, port_axes, scaled
 from supervessel.composite.resolved import ResolvedScene, RigidGroup
 from supervessel.scene.inputs import vessel_of
 from supervessel.scene.schema import Scene

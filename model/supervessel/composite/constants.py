@@ -12,10 +12,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from supervessel.composite.anchors import from_anchor
 from supervessel.composite.docks import Joint, VesselGroup
 from supervessel.composite.inertia import combine_numbers, orbiter_moments, placed_body
-from supervessel.composite.poses import Pose, constant, mated_pose, port_axes, scaled
+from supervessel.composite.poses import Pose, constant, from_anchor, mated_pose, port_axes, scaled
 from supervessel.scene.inputs import vessel_of
 from supervessel.scene.schema import Port, Scene, Vessel
 

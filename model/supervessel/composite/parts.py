@@ -9,11 +9,17 @@ from dataclasses import dataclass
 import casadi as ca
 
 from supervessel.composite.actions import action_parts, vessel_parts
-from supervessel.composite.anchors import anchor
 from supervessel.composite.bodies import composite_body, lookup_in
 from supervessel.composite.inertia import Body, ldl, ldl_inverse, upper_triangle
-from supervessel.composite.poses import constant
+from supervessel.composite.poses import anchor, constant
 from supervessel.composite.resolved import ResolvedScene
+from supervessel.composite.wheels import (
+    WheelAxes,
+    free_inertia,
+    placed_wheels,
+    wheel_parts,
+    without_locked,
+)
 from supervessel.layout import slices_of, stacked
 from supervessel.rotation.laws import LAWS
 from supervessel.scene.numbers import EPSILON
@@ -27,8 +33,8 @@ mass       : [kg]
 barycentre : [m], from the root vessel's origin, root axes
 inertia    : J about the barycentre [kg m2], body axes: xx, yy, zz, xy, xz, yz
 pmi        : diagonal of J over mass [m2]
-margins    : pivots of J = L D L^T, each less PIVOT_SLACK [kg m2]; all three are positive where J is positive
-             definite as far as doubles can tell
+margins    : pivots of J - A = L D L^T, A of wheels, see `composite.wheels`, each less PIVOT_SLACK [kg m2];
+             all three are positive where J - A is positive definite as far as doubles can tell
 """
 
 PIVOT_SLACK = 16.0 * EPSILON
@@ -78,38 +84,45 @@ def composite_parts(resolved: ResolvedScene, p: ca.SX) -> dict[str, ca.SX]:
 
     The parts of COMPOSITE_SIZES come first. Then, each where the scene has it:
 
-    law           : the numbers that the rotation law needs, see `rotation.laws`
+    law           : the numbers that the rotation law needs, of J - A, see `rotation.laws`
     momentum      : (4,), where ports move: angular momentum h, (3,) [N m s], body axes, of the parts that
-                    move relative to body axes; and the square, [rad2/s2], of |h| trace(J^-1), which bounds
-                    |J^-1 (omega x h)|/|omega|
+                    move relative to body axes; and the square, [rad2/s2], of |h| trace((J - A)^-1), which
+                    bounds |(J - A)^-1 (omega x h)|/|omega|
+    lightness     : (1,) [1/(kg m2)], where there are wheels: trace((J - A)^-1)
+    wheels, wheel_rates : see `composite.wheels.wheel_parts`
     moment, force : see `composite.actions.action_parts`
     .NAME         : of the vessel NAME, see `composite.actions.vessel_parts`
     """
     lookup = lookup_in(resolved.shaping, p)
-    body = composite_body(resolved, lookup)
-    parts = body_parts(resolved.scene, body)
+    body, wheels = composite_body(resolved, lookup), placed_wheels(resolved, lookup)
+    parts = body_parts(resolved.scene, without_locked(body, wheels), wheels) | wheel_parts(wheels)
     parts |= action_parts(resolved, lookup, body.centre) | vessel_parts(resolved, lookup, body)
     return {name: ca.densify(part) for name, part in parts.items()}
 
 
-def body_parts(scene: Scene, body: Body) -> dict[str, ca.SX]:
+def body_parts(scene: Scene, body: Body, wheels: WheelAxes | None = None) -> dict[str, ca.SX]:
     """Returns the parts of c that follow from the composite as one body.
 
-    body : the composite in the root vessel's axes, their origin at its anchor
+    body   : the composite in the root vessel's axes, their origin at its anchor
+    wheels : of its vessels
     """
     J, law = body.inertia, scene.rotation.law
     may_be_point = law == "none"  # the one law that takes a mass point, whose moments are zero
-    lower, pivots = ldl(J, singular=may_be_point)
+    turning = free_inertia(J, wheels)
+    lower, pivots = ldl(turning, singular=may_be_point)
     parts = {
         "mass": body.mass,
         "barycentre": body.centre + constant(anchor(scene, scene.root)),
         "inertia": upper_triangle(J),
         "pmi": ca.diag(J) / body.mass,
-        "margins": _margins(J, pivots, may_be_point),
-        "law": LAWS[law].prepare(J),
+        "margins": _margins(turning, pivots, may_be_point),
+        "law": LAWS[law].prepare(turning),
     }
-    if body.spin is not None:
+    if body.spin is not None or wheels is not None:
         bound = ca.SX(0.0) if may_be_point else ca.trace(ldl_inverse(lower, pivots))
+    if wheels is not None:
+        parts["lightness"] = bound
+    if body.spin is not None:
         parts["momentum"] = ca.vertcat(body.spin, ca.sumsqr(body.spin) * bound * bound)
     return {name: ca.densify(part) for name, part in parts.items()}
 

@@ -1,14 +1,21 @@
-"""Poses in CasADi symbols: where frames stand and how they move, port frames, mating."""
+"""Poses in CasADi symbols: where frames stand and how they move, port frames, mating.
+
+Places are reckoned from the anchor of a vessel, so that where its axes begin costs no digits: positions in
+its axes may all be far from their origin, but their differences from the centre of mass are not, and of them
+alone the composite's tensor is made.
+"""
 
 from dataclasses import dataclass
 from math import frexp, ldexp
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from supervessel.composite.templates import inlined
+from supervessel.scene.inputs import vessel_of
 from supervessel.scene.numbers import Vector
+from supervessel.scene.schema import Scene
 
 
 @dataclass(frozen=True)
@@ -88,3 +95,17 @@ def scaled(vector: Vector) -> ArrayLike:
 def constant(value: ArrayLike) -> ca.SX:
     """Returns an array of numbers as a dense CasADi expression of the same shape."""
     return ca.densify(ca.SX(ca.DM(np.asarray(value, dtype=float))))
+
+
+def anchor(scene: Scene, vessel: str) -> NDArray[np.float64]:
+    """Returns a vessel's anchor, (3,) [m], vessel axes: its centre of mass.
+
+    The origin of its axes where a port of it has a pose input: C adds that pose up as it is set.
+    """
+    moved = any(vessel_of(port) == vessel for port in scene.inputs.pose)
+    return np.zeros(3) if moved else np.array(scene.vessels[vessel].centre_of_mass, dtype=float)
+
+
+def from_anchor(scene: Scene, vessel: str, position: ArrayLike) -> NDArray[np.float64]:
+    """Returns a position in a vessel's axes, (3,) [m], as seen from the vessel's anchor."""
+    return np.asarray(position, dtype=float) - anchor(scene, vessel)

@@ -107,7 +107,7 @@ class ResolvedScene:
 
     @cached_property
     def output_kinds(self) -> tuple[tuple[OutputKind, str], ...]:
-        """Kind and vessel, "" for the whole, of each output in the scene's order."""
+        """Kind and owner, "" for the whole, of each output in the scene's order."""
         return tuple(output_kind(group) for group in self.scene.outputs.names)
 
     @cached_property
@@ -118,7 +118,7 @@ class ResolvedScene:
 
     @cached_property
     def states(self) -> tuple[StateVariable, ...]:
-        """The seven states of model exchange."""
+        """The states of model exchange."""
         return state_variables(self.scene)
 
     @cached_property

@@ -1,16 +1,17 @@
 """What the FMU starts with, the scene's own values of the inputs: the composite, and where vessels stand."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import frexp, ldexp
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from supervessel.composite.anchors import anchor
 from supervessel.composite.constants import places
 from supervessel.composite.docks import groups, joints
+from supervessel.composite.inertia import UPPER_TRIANGLE
 from supervessel.composite.parts import composite_graph
+from supervessel.composite.poses import anchor
 from supervessel.composite.resolved import resolve
 from supervessel.scene.inputs import vessel_of
 from supervessel.scene.schema import Inputs, Scene
@@ -48,6 +49,16 @@ def composite_at_start(scene: Scene) -> dict[str, NDArray[np.float64]]:
     graph = composite_graph(resolve(scene))
     values = np.array(ca.Function("composite", [graph.p], [graph.c])(p_start(scene))).ravel()
     return {name: values[place] for name, place in graph.slices.items()}
+
+
+def turning_at_start(scene: Scene, c: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Returns J - A, (6,) [kg m2], xx, yy, zz, xy, xz, yz; c : from `composite_at_start`."""
+    elements = c["inertia"].copy()
+    for number, name in enumerate(scene.wheels):
+        axis = c["wheels"][3 * number : 3 * number + 3]
+        own = scene.wheel(name).inertia
+        elements -= [own * axis[i] * axis[j] for i, j in UPPER_TRIANGLE]
+    return elements
 
 
 def principal_moments(elements: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:

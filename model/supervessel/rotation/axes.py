@@ -43,16 +43,17 @@ def axes_graph(resolved: ResolvedScene, plan: Plan, dynamics: Dynamics, products
                 `series`, (3,) or, column by column, (18,), see `Field.gradient_map`
     bound     : (n,), where error_bound is an output: see `rotation.error_bound.constants.stored`
     """
-    inertia = dynamics.inertia
+    inertia, turning = dynamics.inertia, dynamics.turning
     rotation = resolved.scene.rotation
     shown = any(kind.axes for kind, _ in resolved.output_kinds)
     in_series = plan.method is not None and plan.method.control == "series"
     series_turn = in_series and products.size2() > 3
     parts: dict[str, ca.SX] = {}
-    if plan.free != "never" or series_turn or (shown and rotation.law == "tensor"):
-        moments, R_body_principal = principal(LAWS[rotation.law].turning(inertia))
+    shared = rotation.law == "tensor" and dynamics.wheels is None
+    if plan.free != "never" or series_turn or (shown and shared):
+        moments, R_body_principal = principal(LAWS[rotation.law].turning(turning))
     if shown:
-        own = (moments, R_body_principal) if rotation.law == "tensor" else principal(inertia)
+        own = (moments, R_body_principal) if shared else principal(inertia)
         parts["principal"] = ca.vertcat(own[0], quaternion_of_axes(own[1]))
     if plan.free != "never":
         parts["free"] = ca.vertcat(moments, ca.vec(R_body_principal))

@@ -3,13 +3,15 @@
 A change happens at one instant and takes the inputs p from their values before to those after, in stages:
 
 1. docks open: what undocks takes its share of the momentum along, and the root's part keeps its rate omega;
-2. masses and moments change, keeping omega or the momentum H = J omega + h, as the scene says;
+2. masses and moments change, keeping omega or the momentum H = J omega + S, as the scene says;
 3. poses and the motion of ports change, likewise;
 4. docks close: what docks brings along its angular momentum about the common barycentre.
 
-All vectors and tensors are about the barycentre in body axes: J [kg m2] and h [N m s] as in [EQ] When masses
-or poses change, eq. (11), which is the source of the equations here. In stages 2 and 3 J is the tensor of the
-law, `RotationLaw.keeping`; in stage 4 it is the full tensor under every law.
+All vectors and tensors are about the barycentre in body axes. S = h + sum of h_w b_w is the momentum of
+moving parts and wheels [N m s], J the tensor without what wheels have about their axes, J - A, [kg m2]: [EQ]
+When masses or poses change, eq. (11), and Wheels, eq. (16), the sources of the equations here. In stages 2
+and 3 J is the tensor of the law, `RotationLaw.keeping`; in stage 4 it is the full tensor under every law. No
+change changes the momentum h_w of a wheel.
 """
 
 from collections.abc import Callable, Mapping
@@ -24,6 +26,7 @@ from supervessel.composite.bodies import composite_body, lookup_in
 from supervessel.composite.inertia import from_upper_triangle, ldl, ldl_solve
 from supervessel.composite.poses import constant
 from supervessel.composite.resolved import ResolvedScene
+from supervessel.composite.wheels import axes_of, free_inertia, placed_wheels, without_locked
 from supervessel.rotation.laws import LAWS
 
 Parts = Mapping[str, ca.SX]
@@ -34,9 +37,12 @@ Parts = Mapping[str, ca.SX]
 class Change:
     """The functions that a change of inputs is made of; omega is (3,) [rad/s], c and d are composites, (n,).
 
-    momentum_of      : omega, c -> H = J omega + h, (3,) [N m s]
-    rate_of_momentum : H, c -> omega = J^-1 (H - h)
-    keep_momentum    : omega, c, d -> omega - J_d^-1 ((J_d - J_c) omega + h_d - h_c), after a change from c to
+    Arguments omega and H, (3 + m,), have the momenta of the scene's m wheels [N m s] behind them; results are
+    (3,).
+
+    momentum_of      : omega, c -> H = J omega + S, (3,) [N m s]
+    rate_of_momentum : H, c -> omega = J^-1 (H - S)
+    keep_momentum    : omega, c, d -> omega - J_d^-1 ((J_d - J_c) omega + S_d - S_c), after a change from c to
                        d that keeps H; to the last bit omega where c and d are the same
     contact_momentum : p, k -> dH, (3,) [N m s], that closing docks bring, whose parts move by k at contact
     docked_rate      : omega, dH, d -> omega + J_d^-1 dH, J_d the full tensor
@@ -63,24 +69,34 @@ def change_functions(
                its second port relative to the first, in the axes of the first one's vessel
     """
     law = LAWS[resolved.scene.rotation.law]
-    omega, added, d = ca.SX.sym("omega", 3), ca.SX.sym("added", 3), ca.SX.sym("d", c.numel())
+    size = 3 + len(resolved.scene.wheels)
+    rates, momenta, d = ca.SX.sym("omega", size), ca.SX.sym("added", size), ca.SX.sym("d", c.numel())
+    omega, stored, momentum, added = rates[:3], rates[3:], momenta[:3], ca.SX.sym("added", 3)
     before, after = parts_of(c), parts_of(d)
-    kept, kept_after = (law.keeping(from_upper_triangle(parts["inertia"])) for parts in (before, after))
+    wheels, wheels_after = (axes_of(resolved, parts) for parts in (before, after))
+    turning = free_inertia(from_upper_triangle(before["inertia"]), wheels)
+    full = free_inertia(from_upper_triangle(after["inertia"]), wheels_after)
+    kept, kept_after = law.keeping(turning), law.keeping(full)
     spin, spin_after = (spin_of(parts) for parts in (before, after))
     change = (kept_after - kept) @ omega + (spin_after - spin)
-    full = from_upper_triangle(after["inertia"])
+    held, held_of_momentum = spin, spin
+    if wheels is not None and wheels_after is not None:
+        change += (wheels_after.axes - wheels.axes) @ stored
+        held, held_of_momentum = held + wheels.axes @ stored, held + wheels.axes @ momenta[3:]
     return Change(
-        momentum_of=_function("momentum_of", {"omega": omega, "c": c}, kept @ omega + spin),
+        momentum_of=_function("momentum_of", {"omega": rates, "c": c}, kept @ omega + held),
         rate_of_momentum=_function(
-            "rate_of_momentum", {"momentum": added, "c": c}, ldl_solve(*ldl(kept), added - spin)
+            "rate_of_momentum",
+            {"momentum": momenta, "c": c},
+            ldl_solve(*ldl(kept), momentum - held_of_momentum),
         ),
         keep_momentum=_function(
-            "keep_momentum", {"omega": omega, "c": c, "d": d}, omega - ldl_solve(*ldl(kept_after), change)
+            "keep_momentum", {"omega": rates, "c": c, "d": d}, omega - ldl_solve(*ldl(kept_after), change)
         ),
         contact_momentum=_function("contact_momentum", {"p": p, "k": k}, contact_momentum(resolved, p, k)),
         docked_rate=_function(
             "docked_rate",
-            {"omega": omega, "momentum": added, "d": d},
+            {"omega": rates, "momentum": added, "d": d},
             omega + ldl_solve(*ldl(full), added),
         ),
     )
@@ -148,19 +164,21 @@ def followed(
 
     composite : p -> c
     margins   : place in c of the three numbers that are positive where the tensor is positive definite
-    inputs    : omega before, (3,) [rad/s], body axes; p before and p after, (m,); k, (6 d,)
+    inputs    : omega before, (3,) [rad/s], body axes, and momenta of wheels [N m s]; p before and p after,
+                (m,); k, (6 d,)
     Between two stages the composite may have no mass or a singular tensor. NaN is returned where a stage that
     keeps the momentum changes an input from or to such a composite; the FMU refuses that change.
     """
-    omega, before, after, k = inputs
+    rates, before, after, k = inputs
+    omega, stored = rates[:3], rates[3:]
     found, closing = stages(resolved, resolved.scene.keeps, before, after)
     for stage in found:
         if stage.kept == "momentum":
             c, d, refused = stage_composites(stage, composite, margins, after)
-            omega = change.keep_momentum(omega, c, d) + refused
+            omega = change.keep_momentum(ca.vertcat(omega, stored), c, d) + refused
     if closing.numel():
         momentum = change.contact_momentum(after, each_motion(closing) * k)
-        omega = change.docked_rate(omega, momentum, composite(after))
+        omega = change.docked_rate(ca.vertcat(omega, stored), momentum, composite(after))
     return omega
 
 
@@ -188,5 +206,5 @@ def contact_momentum(resolved: ResolvedScene, p: ca.SX, k: ca.SX) -> ca.SX:
     def at_contact(group: str, value: ArrayLike) -> ca.SX:
         return constant(np.zeros(3)) if group in still else lookup(group, value)
 
-    spin = composite_body(resolved, at_contact).spin
-    return ca.SX.zeros(3) if spin is None else spin
+    body = without_locked(composite_body(resolved, at_contact), placed_wheels(resolved, at_contact))
+    return ca.SX.zeros(3) if body.spin is None else body.spin

@@ -16,10 +16,12 @@ from supervessel.rotation.dynamics import Dynamics
 class ExchangeStates:
     """The states z that an importer's solver integrates.
 
-    symbols : z, (7,): q_inertial_body, then omega [rad/s] or the momentum H = J omega + h [N m s], body axes
+    symbols : z, (7 + n,): q_inertial_body, then omega [rad/s] or the momentum H of the whole [N m s], body
+              axes, then the momenta of n wheels [N m s]
     name    : name of z as an argument of functions, "x" or "z"
-    rate    : z_dot, (7,), an expression of z
-    x       : q_inertial_body and omega [rad/s], body axes, (7,), an expression of z
+    rate    : z_dot, (7 + n,), an expression of z
+    x       : q_inertial_body, omega [rad/s], body axes, and the momenta of wheels, (7 + n,), an expression of
+              z
     """
 
     symbols: ca.SX
@@ -29,19 +31,21 @@ class ExchangeStates:
 
 
 def states_by_rate(x: ca.SX, dynamics: Dynamics) -> ExchangeStates:
-    """Returns attitude and angular velocity, x, (7,), as the states."""
+    """Returns attitude, angular velocity and momenta of wheels, x, (7 + n,), as the states."""
     return ExchangeStates(x, "x", dynamics.state_rate(x), x)
 
 
 def states_by_momentum(change: Change, c: ca.SX, dynamics: Dynamics) -> ExchangeStates:
     """Returns attitude and angular momentum as the states.
 
-    change : gives omega = J^-1 (H - h), see `changes.Change`
+    change : gives omega of H, see `changes.Change`
     c      : symbols of the composite, (n,)
     A change of inputs that keeps the angular momentum then leaves the states as they are.
     """
-    z = ca.SX.sym("z", 7)
-    attitude, momentum = z[:4], z[4:]
-    omega = change.rate_of_momentum(momentum, c)
+    z = ca.SX.sym("z", 4 + change.rate_of_momentum.numel_in(0))
+    attitude, momentum, stored = z[:4], z[4:7], z[7:]
+    omega = change.rate_of_momentum(z[4:], c)
     rate = ca.vertcat(attitude_dot(attitude, omega), dynamics.momentum_rate(attitude, omega, momentum))
-    return ExchangeStates(z, "z", rate, ca.vertcat(attitude, omega))
+    if dynamics.wheels is not None:
+        rate = ca.vertcat(rate, dynamics.wheels.rate)
+    return ExchangeStates(z, "z", rate, ca.vertcat(attitude, omega, stored))

@@ -19,7 +19,8 @@ from supervessel.scene.schema import Scene
 
 @dataclass(frozen=True)
 class StepFunctions:
-    """Steps of a scene in time: x is (attitude, angular velocity), u the inputs that act, c the composite.
+    """Steps of a scene in time: x is (attitude, angular velocity, momenta of wheels), u the inputs that act,
+    c the composite.
 
     fastest_square : x, u, c -> square [rad2/s2] of a rate that the body does not exceed while it turns by the
                      scene's largest angle of a sub-step
@@ -59,7 +60,7 @@ def step_functions(
         rate,
         dynamics.law,
         dynamics.numbers,
-        dynamics.torque,
+        dynamics.body_torque,
         h,
         scene.rotation.tolerance,
         estimated,
@@ -102,23 +103,26 @@ def _rate_function(
 
     angle : largest angle of a sub-step [rad]
     """
-    by_torque = ca.sqrt(ca.sumsqr(motion.acceleration_by_torque))
-    square = _fastest_square(angle, motion, dynamics, by_torque)
+    square = _fastest_square(angle, motion, dynamics, lambda vector: ca.sqrt(ca.sumsqr(vector)))
     return ca.Function("fastest_square", [*symbols], [square], ["x", "u", "c"], ["rate_square"])
 
 
-def _fastest_square(angle: float, motion: StepSymbols, dynamics: Dynamics, by_torque: ca.SX) -> ca.SX:
+def _fastest_square(
+    angle: float, motion: StepSymbols, dynamics: Dynamics, length: Callable[[ca.SX], ca.SX]
+) -> ca.SX:
     """Returns the square [rad2/s2] of a rate that the body does not exceed while it turns by `angle` [rad].
 
-    by_torque : length of the acceleration by the constant torque [rad/s2]
+    length : a vector -> its length
     In a field of gravity the direction to the centre turns too: relative to it the body turns no faster than
     by the sum of both rates.
     """
     field, omega = motion.field, motion.state[4:7]
+    by_torque = length(motion.acceleration_by_torque)
+    held = dynamics.held_square(motion.state, angle, length)
     if field is None:
-        return fastest_square(omega, by_torque, motion.law.growth, angle, dynamics.spin_square)
+        return fastest_square(omega, by_torque, motion.law.growth, angle, held)
     pushed = by_torque + field.largest_acceleration(motion.law, motion.numbers)
-    square = fastest_square(omega, pushed, motion.law.growth, angle, dynamics.spin_square)
+    square = fastest_square(omega, pushed, motion.law.growth, angle, held)
     orbit = field.orbit_rate()
     return square + orbit * (orbit + 2.0 * smooth_root(square))
 
@@ -130,8 +134,7 @@ def _longest_step_function(
 
     angle : largest angle of a sub-step [rad]
     """
-    by_torque = smooth_length(motion.acceleration_by_torque)
-    square = _fastest_square(angle, motion, dynamics, by_torque)
+    square = _fastest_square(angle, motion, dynamics, smooth_length)
     return ca.Function("longest_step", [*symbols], [longest_step(square, angle)], ["x", "u", "c"], ["h_max"])
 
 
@@ -153,7 +156,7 @@ def _rounding_function(
     motion: StepSymbols, dynamics: Dynamics, symbols: tuple[ca.SX, ca.SX, ca.SX], h: ca.SX
 ) -> ca.Function:
     """Returns rounding."""
-    turning = dynamics.law.turning(dynamics.inertia)
+    turning = dynamics.law.turning(dynamics.turning)
     angle = turned_by_rounding(turning, motion.state[4:7], motion.acceleration_at_start, h)
     return ca.Function("rounding", [*symbols, h], [angle], ["x", "u", "c", "h"], ["angle"])
 

@@ -33,7 +33,7 @@ def consistency_problems(raw: Mapping[str, Any]) -> list[str]:
         problems += _rigid_moments(place, vessel) if rigid else _no_tensor(place, vessel)
         for port, table in tables(vessel, "ports"):
             problems += direction_problems(f"{place}.ports.{toml_key(port)}", table)
-    problems += [*_experiment(raw), *_accuracy(raw), *_ranges(raw), *_total_mass(raw)]
+    problems += [*_experiment(raw), *_accuracy(raw), *_ranges(raw), *_total_mass(raw), *_wheels(raw)]
     return [*problems, *_gravity(raw), *_propagator(raw), *_changes(raw)]
 
 
@@ -194,6 +194,29 @@ def _total_mass(raw: Mapping[str, Any]) -> Iterator[str]:
         yield f"vessels: total mass = {sum(masses)} kg: must be a finite number > 0"
 
 
+def has_wheels(raw: Mapping[str, Any]) -> bool:
+    """Whether a vessel of a scene, given as its raw tables, has wheels."""
+    return any(tables(vessel, "wheels") for _, vessel in tables(raw, "vessels"))
+
+
+def _wheels(raw: Mapping[str, Any]) -> Iterator[str]:
+    """Yields why the scene cannot have the wheels that it has."""
+    for name, vessel in tables(raw, "vessels"):
+        if tables(vessel, "wheels") and _number(vessel, "mass") == 0.0:
+            yield f"vessels.{toml_key(name)}.mass = 0.0 kg: must be > 0 for a vessel with wheels"
+    if not has_wheels(raw):
+        return
+    rotation = raw.get("rotation", {})
+    if isinstance(rotation, Mapping) and rotation.get("law") == "none":
+        yield 'rotation.law = "none": knows no momentum; a scene with wheels needs any other law'
+    if raw.get("convention") == "orbiter":
+        yield 'convention = "orbiter": knows no wheels; take them away, or the convention'
+    if "accuracy" in raw:
+        yield "accuracy: the bounds by which it chooses know no wheels; give law and propagator yourself"
+    if _shows_bound(raw):
+        yield "outputs.names: error_bound knows no wheels; leave it out of a scene that has them"
+
+
 def _number(table: Mapping[str, Any], key: str) -> float:
     """Returns a key's finite number, NaN where the key is missing or has something else."""
     value = table.get(key)
@@ -207,7 +230,7 @@ def _propagator(raw: Mapping[str, Any]) -> Iterator[str]:
         return
     name = rotation.get("propagator")
     method = PROPAGATORS.get(name) if isinstance(name, str) else None
-    reason = method.suits(str(rotation.get("law", "")), inputs) if method else ""
+    reason = method.reason_against(str(rotation.get("law", "")), inputs, has_wheels(raw)) if method else ""
     if reason:
         yield f'rotation.propagator = "{name}": {reason}'
 

@@ -21,7 +21,7 @@ where the body is in a field of gravity."""
 Change = Literal["mass", "pose", "docked", ""]
 """What changes with an input: masses and moments; poses and motion of ports; docks; "": none of these."""
 
-Owner = Literal["vessel", "port", "dock", "point", ""]
+Owner = Literal["vessel", "port", "dock", "point", "wheel", ""]
 """What the entries of a list in `[inputs]` name; "": the key is true or false and stands for the assembly."""
 
 Judge = Literal["MASS", "PMI", "PORT", ""]
@@ -37,8 +37,8 @@ class InputKind:
     key         : key of `[inputs]`, whose list names the owners
     quantity    : last part of the variables' names, `mass` in `DG.mass`
     owner       : what an owner is
-    elements    : 3 for a vector, whose variables carry an index from 1, as every input that acts is; 0 for a
-                  scalar
+    elements    : 3 for a vector, whose variables carry an index from 1, as every force or torque on the
+                  body is; 0 for a scalar
     unit        : as FMI writes it, "" for a pure number
     part        : its use
     change      : what changes with it; by it `schema.discrete_changes` tells the kinds that change at events
@@ -111,12 +111,12 @@ class InputKind:
 
 
 def vessel_of(name: str) -> str:
-    """Returns "vessel" of "vessel.port", "vessel.point" or "vessel"."""
+    """Returns "vessel" of "vessel.port", "vessel.point", "vessel.wheel" or "vessel"."""
     return name.partition(".")[0]
 
 
 def part_of(name: str) -> tuple[str, str]:
-    """Returns "vessel" and "part" of "vessel.part", the name of a port or a point."""
+    """Returns "vessel" and "part" of "vessel.part", the name of a port, a point or a wheel."""
     vessel, part = name.split(".")
     return vessel, part
 
@@ -265,6 +265,17 @@ TORQUE = InputKind(
     "external torque about the barycentre, {axis} in body axes",
     _zero,
 )
+WHEEL_TORQUE = InputKind(
+    "wheel",
+    "torque",
+    "wheel",
+    0,
+    "N.m",
+    "action",
+    "",
+    "motor torque on wheel {owner} along its axis; {vessel} gets the opposite",
+    _zero,
+)
 FORCE = InputKind(
     "force",
     "force",
@@ -317,6 +328,7 @@ BLOCKS: tuple[tuple[InputKind, ...], ...] = (
     (DOCKED,),
     (CONTACT_VELOCITY, CONTACT_RATE),
     (TORQUE,),
+    (WHEEL_TORQUE,),
     (FORCE,),
     (VESSEL_TORQUE,),
     (GRAVITY_POSITION, GRAVITY_VELOCITY),

@@ -6,11 +6,12 @@ The raw tables of a file are checked, so that a wrong name is reported beside a 
 import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from itertools import combinations
 from typing import Any
 
 from supervessel.problems import listed, printable, quantity, toml_key, unknown
 from supervessel.scene.inputs import InputKind, by_group, kinds, part_of, rows_by_key, vessel_of
-from supervessel.scene.outputs import OUTPUTS, VESSEL_OUTPUTS
+from supervessel.scene.outputs import OUTPUTS, VESSEL_OUTPUTS, WHEEL_OUTPUTS
 
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 MODEL_NAME = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*_?")
@@ -26,7 +27,11 @@ MOST_LISTED = 2000
 scene within these limits is read in seconds."""
 
 Ports = Mapping[str, Collection[str]]
-"""By vessel, the names of its ports, or of its points."""
+"""By vessel, the names of its ports, of its points, or of its wheels."""
+
+PARTS = {"ports": "port", "points": "point", "wheels": "wheel"}
+"""Keys of a vessel's table that hold named parts, and what one of them is called. A name is that of one
+part."""
 
 RESERVED = frozenset(
     (
@@ -41,7 +46,7 @@ RESERVED = frozenset(
         "attitude_start",
     )
 )
-"""Names of the FMU's own variables, present and planned: no vessel or port can be called so."""
+"""Names of the FMU's own variables, present and planned: no vessel, port, point or wheel can be called so."""
 
 
 def size_problems(raw: Mapping[str, Any]) -> Iterator[str]:
@@ -95,7 +100,7 @@ def _repeated(names: Iterable[str]) -> Iterator[str]:
 
 
 def _parts(raw: Mapping[str, Any], key: str) -> Ports:
-    """Returns the names of the "ports" or "points" of each vessel."""
+    """Returns the names of the "ports", the "points" or the "wheels" of each vessel."""
     return {vessel: _table(table, key).keys() for vessel, table in _table(raw, "vessels").items()}
 
 
@@ -125,11 +130,12 @@ def _too_long(name: str) -> str:
 def _identifiers(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
     if not ports and isinstance(raw.get("vessels"), Mapping):
         yield "vessels: at least one vessel is needed"
-    points = _parts(raw, "points")
     places = [("vessels", vessel) for vessel in ports]
-    for key, owners in (("ports", ports), ("points", points)):
+    for key in PARTS:
         places += [
-            (f"vessels.{toml_key(vessel)}.{key}", part) for vessel, names in owners.items() for part in names
+            (f"vessels.{toml_key(vessel)}.{key}", part)
+            for vessel, names in _parts(raw, key).items()
+            for part in names
         ]
     places += [(f"docks[{i}].name", name) for i, name in _dock_names(raw).items()]
     for place, name in places:
@@ -140,10 +146,7 @@ def _identifiers(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
             yield f"{place}: name {quantity(name)} {rule}"
         elif name in RESERVED:
             yield f'{place}: name "{name}" is reserved for a variable of the FMU'
-    for vessel, names in points.items():
-        for name in sorted(set(names).intersection(ports[vessel])):
-            here = printable(vessel)
-            yield f'vessels.{here}.points: name "{printable(name)}" is that of a port of {here}'
+    yield from _shared_names(raw)
     first: dict[str, int] = {}
     for i, name in _dock_names(raw).items():
         if name in ports:
@@ -152,13 +155,24 @@ def _identifiers(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
             yield f'docks[{i}].name: name "{printable(name)}" is that of docks[{first[name]}]'
 
 
+def _shared_names(raw: Mapping[str, Any]) -> Iterator[str]:
+    """Yields which names of a vessel's parts are those of two of its parts."""
+    of_vessels = {key: _parts(raw, key) for key in PARTS}
+    for (key, owners), (other, others) in combinations(reversed(of_vessels.items()), 2):
+        for vessel, names in owners.items():
+            for name in sorted(set(names).intersection(others[vessel])):
+                here = printable(vessel)
+                said = f'name "{printable(name)}" is that of a {PARTS[other]} of {here}'
+                yield f"vessels.{here}.{key}: {said}"
+
+
 def _is_port(name: str, ports: Ports) -> bool:
     vessel, _, port = name.partition(".")
     return port in ports.get(vessel, ())
 
 
 def _port_problem(name: object, ports: Ports, kind: str = "port") -> str:
-    """Returns why `name` is no port (or point) of the scene, or "" if it is one."""
+    """Returns why `name` is no port (or point, or wheel) of the scene, or "" if it is one."""
     if not isinstance(name, str) or name.count(".") != 1:
         return f'{quantity(name)} must be a {kind}, written "vessel.{kind}"'
     vessel, port = part_of(name)
@@ -230,7 +244,7 @@ def _root(raw: Mapping[str, Any], component: Mapping[str, set[str]], ports: Port
 
 
 def _inputs(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
-    inputs, points = _table(raw, "inputs"), _parts(raw, "points")
+    inputs, owned = _table(raw, "inputs"), {PARTS[key]: _parts(raw, key) for key in PARTS}
     docked = {name for dock in _list(raw, "docks") for name in _named(dock, "ports")}
     all_resolved = all(_is_port(name, ports) for name in docked)
     lists = {kind.within: _named(inputs, kind.within) for kind in kinds() if kind.within}
@@ -257,8 +271,8 @@ def _inputs(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
             return port_problem(kind, name)
         if kind.owner == "dock":
             return None if name in docks else unknown("dock", name, docks)
-        if kind.owner == "point":
-            return _port_problem(name, points, "point")
+        if kind.owner in ("point", "wheel"):
+            return _port_problem(name, owned[kind.owner], kind.owner)
         return vessel_problem(kind, name)
 
     for key, kind in rows_by_key().items():
@@ -312,6 +326,11 @@ def _outputs(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
     names = [name for name in _list(_table(raw, "outputs"), "names") if isinstance(name, str)]
     yield from (f"outputs.names: {problem}" for problem in _repeated(names))
     for name in dict.fromkeys(names):
+        if name.count(".") == 2:
+            problem = _wheel_output_problem(raw, name)
+            if problem:
+                yield f"outputs.names: {problem}"
+            continue
         vessel, dot, output = name.partition(".")
         if dot and vessel in ports and output in VESSEL_OUTPUTS:
             continue
@@ -321,3 +340,18 @@ def _outputs(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
             yield f"outputs.names: {unknown('vessel', vessel, ports)}"
         elif name not in OUTPUTS:
             yield f"outputs.names: {unknown('output', name, OUTPUTS)}"
+
+
+def _wheel_output_problem(raw: Mapping[str, Any], name: str) -> str:
+    """Returns why "vessel.wheel.output" is no output of the scene, or "" if it is one."""
+    wheel, _, output = name.rpartition(".")
+    problem = _port_problem(wheel, _parts(raw, "wheels"), "wheel")
+    if problem:
+        return problem
+    if output not in WHEEL_OUTPUTS:
+        return unknown(f"output of {wheel}", output, WHEEL_OUTPUTS)
+    vessel, own = part_of(wheel)
+    table = _table(_table(_table(_table(raw, "vessels"), vessel), "wheels"), own)
+    if output == "speed" and table.get("inertia", 0.0) == 0.0:
+        return f"{name}: {printable(wheel)} has inertia 0, a momentum without a speed; take {wheel}.momentum"
+    return ""

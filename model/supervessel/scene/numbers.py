@@ -171,6 +171,8 @@ Direction = Annotated[
 ]  # validators run from the right
 Velocity = Annotated[Vector, vector("m/s", "three finite numbers")]
 Mu = Annotated[float, number("m3/s2", "a finite number > 0", 0.0, open_low=True)]
+WheelInertia = Annotated[float, number("kg m2", "a finite number >= 0", 0.0)]
+WheelMomentum = Annotated[float, number("N m s", "a finite number")]
 AngularVelocity = Annotated[Vector, vector("rad/s", "three finite numbers")]
 Seconds = Annotated[float, number("s", "a finite number > 0", 0.0, open_low=True)]
 Angle = Annotated[float, number("rad", "a number from 1e-6 to 1", 1e-6, 1.0)]

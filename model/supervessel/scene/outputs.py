@@ -16,20 +16,25 @@ class Magnitudes:
     mass   : [kg]
     moment : mean of the three moments of inertia [kg m2]
     rate   : length of the angular velocity [rad/s], 1 at rest
+    stored : largest momentum of a wheel [N m s], 1 where all are 0
+    spun   : largest speed of a wheel [rad/s] relative to its vessel at rest, 1 where all stand still
     """
 
     mass: float
     moment: float
     rate: float
+    stored: float = 1.0
+    spun: float = 1.0
 
 
 @dataclass(frozen=True)
 class OutputKind:
     """A kind of output.
 
-    name        : name of the output; an output of a vessel is written "vessel.name" in a scene
+    name        : name of the output; an output of a vessel is written "vessel.name" in a scene, one of a
+                  wheel "vessel.wheel.name"
     unit        : as FMI writes it, "" for a pure number
-    description : text of its variables with a place for {vessel}
+    description : text of its variables with a place for {vessel}, or {wheel} as "vessel.wheel"
     labels      : of its elements, whose variables carry an index from 1; none for a scalar
     of_vessel   : whether it is an output of a vessel, else of the assembly
     matrix      : whether it is a (3, 3) matrix, row by row, whose variables carry two indices
@@ -168,11 +173,36 @@ VESSEL_OUTPUTS: dict[str, OutputKind] = {
 """Outputs of a vessel, by name, written "vessel.name" in a scene. All are zero while docks do not join the
 vessel to the root."""
 
+WHEEL_OUTPUTS: dict[str, OutputKind] = {
+    kind.name: kind
+    for kind in (
+        OutputKind(
+            "momentum",
+            "N.m.s",
+            "angular momentum of wheel {wheel} along its axis, that of its vessel's rate included",
+            (),
+            nominal=lambda whole: whole.stored,
+        ),
+        OutputKind(
+            "speed",
+            "rad/s",
+            "angular velocity of wheel {wheel} relative to its vessel",
+            (),
+            nominal=lambda whole: whole.spun,
+        ),
+    )
+}
+"""Outputs of a wheel, by name, written "vessel.wheel.name" in a scene. The speed is zero while docks do not
+join the vessel to the root."""
+
+OF_OWNER = (OUTPUTS, VESSEL_OUTPUTS, WHEEL_OUTPUTS)
+"""By the number of names that an owner's name is made of, its outputs."""
+
 
 def output_kind(group: str) -> tuple[OutputKind, str]:
-    """Returns kind and vessel of an output that a scene lists; the vessel is "" for one of the assembly.
+    """Returns kind and owner of an output that a scene lists: "", "vessel" or "vessel.wheel".
 
     Raises KeyError for an unknown name.
     """
-    vessel, dot, name = group.rpartition(".")
-    return (VESSEL_OUTPUTS if dot else OUTPUTS)[name], vessel
+    owner, _, name = group.rpartition(".")
+    return OF_OWNER[len(owner.split(".")) if owner else 0][name], owner

@@ -31,6 +31,8 @@ from supervessel.scene.numbers import (
     Tolerance,
     Vector,
     Velocity,
+    WheelInertia,
+    WheelMomentum,
 )
 
 ORIGIN: Vector = (0.0, 0.0, 0.0)
@@ -113,6 +115,21 @@ class Point(Table):
     position: Position
 
 
+class Wheel(Table):
+    """A wheel, or a gyroscope of which only the momentum counts.
+
+    axis     : its direction, vessel axes, of any length > 0
+    inertia  : I_w about the axis [kg m2]; its mass and its moments are part of the vessel's own. With 0 it is
+               a store of momentum along the axis and nothing else: three of them are a cluster of gyroscopes
+    momentum : along the axis at the start [N m s], that of the body's own rate included:
+               I_w (wheel speed + axis . angular velocity of the vessel)
+    """
+
+    axis: Direction
+    inertia: WheelInertia = 0.0
+    momentum: WheelMomentum = 0.0
+
+
 class Vessel(Table):
     """A rigid part: mass [kg], moments about its centre of mass, centre of mass [m] in vessel axes, ports.
 
@@ -130,6 +147,7 @@ class Vessel(Table):
     centre_of_mass: Position = ORIGIN
     ports: dict[str, Port] = Field(default_factory=dict)
     points: dict[str, Point] = Field(default_factory=dict)
+    wheels: dict[str, Wheel] = Field(default_factory=dict)
 
     @property
     def specific_inertia(self) -> Matrix:
@@ -160,6 +178,7 @@ class Inputs(Table):
     motion        : ports listed in `pose` whose velocity and rate are inputs too
     docked        : docks, by name
     torque        : whether there is a torque about the barycentre
+    wheel         : wheels with a motor, "vessel.wheel"
     force         : points, "vessel.point"
     vessel_torque : vessels
     gravity       : whether the gradient of gravity turns the body, of the centre in `[gravity]`
@@ -172,6 +191,7 @@ class Inputs(Table):
     motion: Names = ()
     docked: Names = ()
     torque: Flag = False
+    wheel: Names = ()
     force: Names = ()
     vessel_torque: Names = ()
     gravity: Flag = False
@@ -316,6 +336,27 @@ class Scene(Table):
         vessel, point = part_of(name)
         return self.vessels[vessel].points[point]
 
+    def wheel(self, name: str) -> Wheel:
+        """Returns the wheel called "vessel.wheel". Raises KeyError if there is none.
+
+        Example:
+            >>> scene.wheel("DG.pitch")
+            Traceback (most recent call last):
+            KeyError: 'pitch'
+        """
+        vessel, wheel = part_of(name)
+        return self.vessels[vessel].wheels[wheel]
+
+    @property
+    def wheels(self) -> tuple[str, ...]:
+        """Names "vessel.wheel" of all wheels, in the scene's order: that of their momenta among the states.
+
+        Example:
+            >>> scene.wheels
+            ()
+        """
+        return tuple(f"{name}.{wheel}" for name, vessel in self.vessels.items() for wheel in vessel.wheels)
+
     def dock(self, name: str) -> Dock:
         """Returns the dock of that name. Raises KeyError if there is none.
 
@@ -421,6 +462,7 @@ TABLES: dict[tuple[str, ...], type[Table]] = {
     ("vessels", "*"): Vessel,
     ("vessels", "*", "ports", "*"): Port,
     ("vessels", "*", "points", "*"): Point,
+    ("vessels", "*", "wheels", "*"): Wheel,
     ("docks", "*"): Dock,
     ("inputs",): Inputs,
     ("gravity",): Gravity,

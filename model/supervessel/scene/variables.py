@@ -8,6 +8,7 @@ from supervessel.scene.outputs import (
     AXES,
     OUTPUTS,
     QUATERNION,
+    WHEEL_OUTPUTS,
     OutputKind,
     output_kind,
 )
@@ -72,7 +73,7 @@ class OutputVariable(Variable):
     """An output.
 
     kind  : its row in the table of outputs
-    owner : the vessel that it is of, "" for the whole
+    owner : the vessel or the wheel that it is of, "" for the whole
     """
 
     kind: OutputKind
@@ -83,7 +84,7 @@ class OutputVariable(Variable):
 class StateVariable(Variable):
     """A state of model exchange.
 
-    kind : the row, in the table of outputs, of the quantity whose element it is
+    kind : the row, in the tables of outputs, of the quantity whose element it is
     """
 
     kind: OutputKind
@@ -122,7 +123,7 @@ def input_variables(scene: Scene) -> tuple[InputVariable, ...]:
 
 
 def parameter_variables(scene: Scene) -> tuple[Parameter, ...]:
-    """Returns the parameters: the state at the start, angular velocity first."""
+    """Returns the parameters: the state at the start, angular velocity, attitude, momenta of wheels."""
     rotation = scene.rotation
     rate, attitude = "angular_velocity_start", "attitude_start"
     rates = (
@@ -147,7 +148,17 @@ def parameter_variables(scene: Scene) -> tuple[Parameter, ...]:
         )
         for i, value in enumerate(rotation.attitude)
     )
-    return (*rates, *components)
+    momenta = (
+        Parameter(
+            f"{name}.momentum_start",
+            "N.m.s",
+            f"momentum of wheel {name} at the start, along its axis",
+            scene.wheel(name).momentum,
+            group=f"{name}.momentum_start",
+        )
+        for name in scene.wheels
+    )
+    return (*rates, *components, *momenta)
 
 
 def output_variables(scene: Scene) -> tuple[OutputVariable, ...]:
@@ -156,28 +167,29 @@ def output_variables(scene: Scene) -> tuple[OutputVariable, ...]:
         OutputVariable(
             name,
             kind.unit,
-            kind.description.format(vessel=vessel) + (f", {label}" if label else ""),
+            kind.description.format(vessel=owner, wheel=owner) + (f", {label}" if label else ""),
             group=group,
             element=i,
             kind=kind,
-            owner=vessel,
+            owner=owner,
         )
         for group in scene.outputs.names
-        for kind, vessel in (output_kind(group),)
+        for kind, owner in (output_kind(group),)
         for i, (name, label) in enumerate(kind.elements(group))
     )
 
 
 def state_variables(scene: Scene) -> tuple[StateVariable, ...]:
-    """Returns the seven states of model exchange: attitude (w, x, y, z), then what changes keep.
+    """Returns the states of model exchange: attitude (w, x, y, z), what changes keep, momenta of wheels.
 
-    That is the angular velocity, or the angular momentum where every change keeps it; (x, y, z) in body axes.
+    What changes keep is the angular velocity, or the angular momentum where every change keeps it; (x, y, z)
+    in body axes.
     """
     attitude, kept = OUTPUTS["attitude"], OUTPUTS["angular_velocity"]
     words = kept.description
     if keeps_momentum(scene):
         kept, words = OUTPUTS["angular_momentum"], "angular momentum about the barycentre, body axes"
-    return tuple(
+    body = (
         StateVariable(
             f"state.{kind.name}[{i + 1}]",
             kind.unit,
@@ -190,6 +202,15 @@ def state_variables(scene: Scene) -> tuple[StateVariable, ...]:
         for kind, description, labels in ((attitude, attitude.description, QUATERNION), (kept, words, AXES))
         for i, label in enumerate(labels)
     )
+    return (*body, *map(_wheel_state, scene.wheels))
+
+
+def _wheel_state(name: str) -> StateVariable:
+    """Returns the state of the wheel called "vessel.wheel": no change of inputs changes it."""
+    kind = WHEEL_OUTPUTS["momentum"]
+    words = f"state: {kind.description.format(wheel=name)}; it starts from {name}.momentum_start"
+    group = f"state.{name}.{kind.name}"
+    return StateVariable(group, kind.unit, words, group=group, kind=kind)
 
 
 def derivative_variables(states: Iterable[Variable]) -> tuple[Variable, ...]:
@@ -198,7 +219,7 @@ def derivative_variables(states: Iterable[Variable]) -> tuple[Variable, ...]:
         Variable(
             f"der({state.name})",
             RATE_UNITS[state.unit],
-            f"rate of the state {_words(state)}, element {state.element + 1}",
+            f"rate of the state {_words(state)}",
             group=f"der({state.group})",
             element=state.element,
         )
@@ -208,4 +229,9 @@ def derivative_variables(states: Iterable[Variable]) -> tuple[Variable, ...]:
 
 def _words(state: Variable) -> str:
     """Returns what a state is, in words."""
-    return state.group.removeprefix("state.").replace("_", " ")
+    name = state.group.removeprefix("state.")
+    return (
+        name
+        if name == state.name.removeprefix("state.")
+        else f"{name.replace('_', ' ')}, element {state.element + 1}"
+    )

@@ -33,9 +33,13 @@ def do_mpc_model(twin: "Twin", step: float | None) -> Any:
     attitude = model.set_variable("_x", "attitude", (4, 1))
     rate = model.set_variable("_x", "angular_velocity", (3, 1))
     name = "torque" if all(variable.kind is TORQUE for variable in twin.u_variables) else "u"
-    x, u = ca.vertcat(attitude, rate), model.set_variable("_u", name, (len(twin.u_names), 1))
+    states = {"attitude": attitude, "angular_velocity": rate}
+    if len(twin.x_names) > 7:
+        states["momentum"] = model.set_variable("_x", "momentum", (len(twin.x_names) - 7, 1))
+    x, u = ca.vertcat(*states.values()), model.set_variable("_u", name, (len(twin.u_names), 1))
     p = model.set_variable("_p", "p", (len(twin.p_names), 1)) if twin.p_names else ca.SX(0, 1)
     right = twin.ode(x, u, p) if step is None else twin.step(x, u, p, step)
-    model.set_rhs("attitude", right[:4])
-    model.set_rhs("angular_velocity", right[4:])
+    places = {"attitude": slice(0, 4), "angular_velocity": slice(4, 7), "momentum": slice(7, None)}
+    for name in states:
+        model.set_rhs(name, right[places[name]])
     return model

@@ -1,10 +1,11 @@
 """The error of a state about a reference, six numbers, and its inverse, in CasADi symbols.
 
-A state is (7,): q_inertial_body, of unit length, and omega [rad/s], body axes. The reference has body axes of
-its own. The error is (6,): of the attitude, from q_reference_body = q_ref* q = (w, v), then the difference
-omega - omega_ref of the components [rad/s]. q and -q give the same error: the sign of q_reference_body is
-chosen so that w is not negative. For a turn by the angle alpha about a unit vector n, w = cos(alpha/2) and
-v = n sin(alpha/2), the three forms of the attitude's error, (3,), all equal alpha n [rad] to first order:
+A state is (7 + n,): q_inertial_body, of unit length, omega [rad/s], body axes, and the momenta h of n wheels
+[N m s]. The reference has body axes of its own. The error is (6 + n,): of the attitude, from q_reference_body
+= q_ref* q = (w, v), then the differences omega - omega_ref of the components [rad/s] and h - h_ref. q and -q
+give the same error: the sign of q_reference_body is chosen so that w is not negative. For a turn by the angle
+alpha about a unit vector n, w = cos(alpha/2) and v = n sin(alpha/2), the three forms of the attitude's error,
+(3,), all equal alpha n [rad] to first order:
 
 vec    : 2 v, a polynomial; from 0 to 2 in length, flat at a half turn
 rotvec : alpha n, the rotation vector; from 0 to pi in length
@@ -32,9 +33,9 @@ SERIES_TERMS = 10
 
 
 def state_error(state: ca.SX, reference: ca.SX, form: ErrorForm) -> ca.SX:
-    """Returns the error, (6,) [rad, rad/s], body axes.
+    """Returns the error, (6 + n,) [rad, rad/s, N m s], body axes.
 
-    state, reference : (7,), see the module
+    state, reference : (7 + n,), see the module
     """
     q_reference_body = product(_conjugate(reference[:4]), state[:4])
     q_reference_body = q_reference_body * ca.if_else(q_reference_body[0] < 0.0, -1.0, 1.0)
@@ -63,10 +64,11 @@ def attitude_error(q_reference_body: ca.SX, form: ErrorForm) -> ca.SX:
 
 
 def retracted(reference: ca.SX, error: ca.SX, form: ErrorForm) -> ca.SX:
-    """Returns the state, (7,), that has an error about a reference: `state_error` inverted.
+    """Returns the state, (7 + n,), that has an error about a reference: `state_error` inverted.
 
-    reference : (7,); the state's attitude has the length of the reference's
-    error     : (6,) [rad, rad/s]; NaN is returned for "vec" where the attitude's error is longer than 2
+    reference : (7 + n,); the state's attitude has the length of the reference's
+    error     : (6 + n,) [rad, rad/s, N m s]; NaN is returned for "vec" where the attitude's error is longer
+                than 2
     """
     q_reference_body = turn(error[:3], form)
     return ca.vertcat(product(reference[:4], q_reference_body), reference[4:] + error[3:])
@@ -104,12 +106,12 @@ def _cosine_and_sine_over(square: ca.SX) -> tuple[ca.SX, ca.SX]:
 def error_rate(
     error: ca.SX, rate_reference: ca.SX, acceleration: ca.SX, acceleration_reference: ca.SX, form: ErrorForm
 ) -> ca.SX:
-    """Returns the rate of an error, (6,) [rad/s, rad/s2], as the body and its reference move.
+    """Returns the rate of an error, (6 + n,) [rad/s, rad/s2, N m], as the body and its reference move.
 
-    error                  : (6,) [rad, rad/s]
-    rate_reference         : omega_ref, (3,) [rad/s], axes of the reference; omega = omega_ref + error[3:]
-    acceleration           : omega', (3,) [rad/s2], body axes
-    acceleration_reference : omega_ref', (3,) [rad/s2], axes of the reference
+    error                  : (6 + n,) [rad, rad/s, N m s]
+    rate_reference         : omega_ref, (3,) [rad/s], axes of the reference; omega = omega_ref + error[3:6]
+    acceleration           : omega' [rad/s2], body axes, and h' [N m], (3 + n,)
+    acceleration_reference : omega_ref' [rad/s2], axes of the reference, and h_ref' [N m], (3 + n,)
     q_e = q_reference_body = q_ref* q has the rate q_e' = (q_e (0, omega) - (0, omega_ref) q_e)/2, by the rate
     of an attitude, [EQ] Conventions, eq. (2). The rate of the attitude's error is its derivative by q_e times
     q_e'.
@@ -119,7 +121,7 @@ def error_rate(
     by_turn = ca.Function("by_turn", [q, q_dot], [ca.jtimes(attitude_error(q, form), q, q_dot)])
     q_reference_body = turn(error[:3], form)
     by_reference = product(ca.vertcat(0.0, 0.5 * rate_reference), q_reference_body)
-    q_dot_value = attitude_dot(q_reference_body, rate_reference + error[3:]) - by_reference
+    q_dot_value = attitude_dot(q_reference_body, rate_reference + error[3:6]) - by_reference
     return ca.vertcat(by_turn(q_reference_body, q_dot_value), acceleration - acceleration_reference)
 
 

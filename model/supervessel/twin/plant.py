@@ -30,7 +30,8 @@ X_NAMES = (
     *(f"state.attitude[{i}]" for i in range(1, 5)),
     *(f"state.angular_velocity[{i}]" for i in range(1, 4)),
 )
-"""Names of the FMU's states, where the angular velocity is one; the twin's x always."""
+"""Names of the FMU's states of the body, where the angular velocity is one; the first seven of the twin's
+x."""
 
 
 class Plant:
@@ -67,7 +68,8 @@ class Plant:
         self._p_variables = [inputs[i] for i in free]
         self.p_names = tuple(variable.name for variable in self._p_variables)
         self.u_variables = resolved.acting
-        self.u_names, self.x_names = tuple(variable.name for variable in resolved.acting), X_NAMES
+        self.u_names = tuple(variable.name for variable in resolved.acting)
+        self.x_names = (*X_NAMES, *(f"state.{name}.momentum" for name in scene.wheels))
         self.y_names = tuple(v.name for v in self._model.resolved.outputs if not v.kind.of_step)
         self.p = ca.SX.sym("p", len(free))
         self.u = ca.SX.sym("u", len(self.u_names))
@@ -90,14 +92,17 @@ class Plant:
 
     @cached_property
     def x_start(self) -> NDArray[np.float64]:
-        """The scene's state at the start, (7,).
+        """The scene's state at the start, (7,), and the momenta of wheels behind that.
 
         Example:
             >>> twin.x_start.tolist()
             [1.0, 0.0, 0.0, 0.0, 0.0, 0.0011, 0.0]
         """
-        rotation = self.scene.rotation
-        return np.array([*rotation.attitude, *rotation.angular_velocity])
+        rotation, momenta = (
+            self.scene.rotation,
+            (self.scene.wheel(name).momentum for name in self.scene.wheels),
+        )
+        return np.array([*rotation.attitude, *rotation.angular_velocity, *momenta])
 
     def p_with(self, values: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
         """Returns the scene's p, (n,), with some values changed.
@@ -135,7 +140,7 @@ class Plant:
 
     @cached_property
     def ode(self) -> TwinFunction:
-        """x, u, p -> x_dot, (7,); right for an attitude of any length.
+        """x, u, p -> x_dot, of the size of x; right for an attitude of any length.
 
         Example:
             >>> twin.ode(twin.x_start, [0, 0, 100], twin.p_start).shape
@@ -206,14 +211,15 @@ class Plant:
             True
         """
         model, p_next = self._model, ca.SX.sym("p_next", self.p.numel())
-        shaping, omega = len(model.names.p), self.x[4:]
+        shaping, rates = len(model.names.p), self.x[4:]
+        omega = rates[:3]
         after = ca.substitute(self._inputs, self.p, p_next)
         if model.change is not None:
-            inputs = (omega, self._inputs[:shaping], after[:shaping], self._contact(after))
+            inputs = (rates, self._inputs[:shaping], after[:shaping], self._contact(after))
             with simplification(False):
                 margins = composite_slices()["margins"]
                 omega = followed(model.resolved, model.change, model.composite, margins, inputs)
-        x_next = ca.vertcat(self.x[:4], omega)
+        x_next = ca.vertcat(self.x[:4], omega, rates[3:])
         return self._function("change", {"x": self.x, "p": self.p, "p_next": p_next}, {"x_next": x_next})
 
     @cached_property
@@ -231,13 +237,14 @@ class Plant:
         motion itself is sensitive: over tens of radians of a tumble. Where p changes between steps,
         `error_bound_change` comes first. Not meant to be differentiated. Derivation, and what it rests on:
         model/docs/error_bound.md.
-        Raises ValueError for "split", whose steps have no bound.
+        Raises ValueError for "split", whose steps have no bound, and for a scene with wheels.
 
         Example:
             >>> bound = twin.error_bound(twin.x_start, [0, 0], [0, 0, 100], twin.p_start, 0.1)
             >>> bool(bound[0] < 1e-12)  # the law "tensor" leaves nothing out: method and rounding alone
             True
         """
+        self.refuse_wheels("error_bound")
         bound = ca.SX.sym("bound", 2)
         parts = {name: self._c[place] for name, place in self._model.slices.composite.items()}
         end = bound_over_step(self._model, parts, bound, (self.x, self._turning_inputs, self.h))
@@ -250,7 +257,7 @@ class Plant:
 
         x : before the change, see `change`
         A mass that goes up and down makes the bound of the rate larger each time. The true motion keeps
-        what the scene says for the law "tensor".
+        what the scene says for the law "tensor". Raises ValueError for a scene with wheels.
 
         Example:
             >>> lighter = twin.p_with({"DG.mass": 12000.0})
@@ -258,6 +265,7 @@ class Plant:
             >>> bool(bound[1] <= 1.0)  # the rates stay, and so does their difference; the moments shrink
             True
         """
+        self.refuse_wheels("error_bound_change")
         p_next, bound = ca.SX.sym("p_next", self.p.numel()), ca.SX.sym("bound", 2)
         shaping = len(self._model.names.p)
         following = ca.substitute(self._inputs, self.p, p_next)
@@ -266,8 +274,17 @@ class Plant:
         arguments = {"x": self.x, "bound": bound, "p": self.p, "p_next": p_next}
         return self._function("error_bound_change", arguments, {"bound_next": end})
 
+    def refuse_wheels(self, what: str) -> None:
+        """Raises ValueError where the scene has wheels, which `what` does not know.
+
+        Example:
+            >>> twin.refuse_wheels("my bound")
+        """
+        if self.scene.wheels:
+            raise ValueError(f'{what}: scene "{self.scene.name}" has wheels, which the bound does not know')
+
     def rollout(self, count: int) -> TwinFunction:
-        """Returns the function x, u (m, N), p, h -> x_next (7, N) of N steps under one p.
+        """Returns the function x, u (m, N), p, h -> x_next (n, N) of N steps under one p.
 
         The composite is computed once: a step costs less than one of `step.mapaccum`, whose p may change
         at each. The numbers are the same; of "exact" each state is found from the first one, as in the FMU,
@@ -317,7 +334,7 @@ class Plant:
         return self._checked(function, unit)
 
     def _checked(self, function: ca.Function, unit: bool = True) -> TwinFunction:
-        defaults = {"u": np.zeros(len(self.u_names)), "acceleration_ref": np.zeros(3)}
+        defaults = {"u": np.zeros(len(self.u_names)), "acceleration_ref": np.zeros(self.x.numel() - 4)}
         defaults |= {"p": self.p_start, "p_next": self.p_start}
         return TwinFunction(function, defaults, unit)
 
@@ -327,7 +344,7 @@ class Plant:
         return inputs[first : first + len(self._model.names.k)]
 
     def _stepped(self, place: ca.SX, c: ca.SX, a: ca.SX, more: int = 0) -> tuple[ca.SX, ca.SX]:
-        """Returns state, (7,), and place in the field after h by the scene's method.
+        """Returns state and place in the field after h by the scene's method.
 
         place : position [m] and velocity [m/s] in a field of gravity, (6,), or (0,)
         c, a  : the composite and its axes

@@ -11,13 +11,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from supervessel.composite.inertia import from_upper_triangle
-from supervessel.equations import composite_slices
 from supervessel.fmu import communication_step, generate
 from supervessel.problems import unknown
 from supervessel.rotation.attitude import to_inertial, unit
-from supervessel.rotation.gravity import Field, field_of
-from supervessel.rotation.laws import LAWS
+from supervessel.rotation.dynamics import Dynamics, dynamics_of
 from supervessel.rotation.principal import principal
 from supervessel.twin.conventions import acados_model, do_mpc_model
 from supervessel.twin.error_state import error_rate, retracted, state_error
@@ -50,10 +47,10 @@ FUNCTIONS = (
 class Scales:
     """Magnitudes by which the numbers of a problem are divided to be about 1.
 
-    x : (7,), of attitude and angular velocity [rad/s]
+    x : of attitude, angular velocity [rad/s] and momenta of wheels [N m s]
     u : (m,), of torques [N m]; the same numbers stand for forces [N]
     p : (n,), each in the unit of its input
-    e : (6,), of the error state [rad, rad/s]
+    e : of the error state [rad, rad/s, N m s]
     h : [s]
     """
 
@@ -67,11 +64,14 @@ class Scales:
 class Twin(Plant):
     """CasADi functions of a scene, from the very expressions that its FMU is generated from.
 
-    x = (attitude w, x, y, z; angular velocity [rad/s], body axes), (7,)
-    u = the inputs that act, torque [N m] first, then forces [N] and torques on vessels, (m,)
+    x = (attitude w, x, y, z; angular velocity [rad/s], body axes), (7,), and behind that the momentum of each
+        wheel along its axis [N m s]: seven numbers are told below, each wheel adds one
+    u = the inputs that act, torque [N m] first, then motors of wheels [N m], forces [N] and torques on
+        vessels, (m,)
     p = the FMU's other inputs, (n,), in the order of its model description
     h = step [s]
-    e = (error of attitude [rad], of angular velocity [rad/s]) about a reference, body axes, (6,)
+    e = (error of attitude [rad], of angular velocity [rad/s]) about a reference, body axes, (6,), and behind
+        that the difference of each wheel's momentum [N m s]
 
     `composite`, `ode`, `step`, `longest_step`, `outputs`, `rollout` and `communication_step` give the FMU's
     numbers; `error_bound` and `error_bound_change` bound what law and method are off by; `error`, `retract`,
@@ -127,7 +127,7 @@ class Twin(Plant):
             >>> twin.error([-0.8, 0, 0, -0.6, 0, 0, 0.5], [1, 0, 0, 0, 0, 0, 0])
             DM([-0, -0, 1.287, 0, 0, 0.5])
         """
-        x_ref = ca.SX.sym("x_ref", 7)
+        x_ref = ca.SX.sym("x_ref", self.x.numel())
         e = state_error(self.x, x_ref, self.error_form)
         return self._function("error", {"x": self.x, "x_ref": x_ref}, {"e": e})
 
@@ -142,7 +142,7 @@ class Twin(Plant):
             >>> [round(v, 12) for v in twin.error(x, twin.x_start).full().ravel().tolist()]
             [0.1, 0.0, 0.0, 0.0, 0.0, 0.001]
         """
-        x_ref, e = ca.SX.sym("x_ref", 7), ca.SX.sym("e", 6)
+        x_ref, e = ca.SX.sym("x_ref", self.x.numel()), ca.SX.sym("e", self.x.numel() - 1)
         x = retracted(x_ref, e, self.error_form)
         return self._function("retract", {"x_ref": x_ref, "e": e}, {"x": x})
 
@@ -150,16 +150,19 @@ class Twin(Plant):
     def error_ode(self) -> TwinFunction:
         """e, u, p, x_ref, acceleration_ref -> e_dot, (6,) [rad/s, rad/s2], about a reference in motion.
 
-        acceleration_ref : (3,) [rad/s2], rate of the components of omega_ref; left out it is zero
+        acceleration_ref : (3,) [rad/s2], rate of the components of omega_ref, and of momenta of wheels behind
+                           that [N m]; left out it is zero
 
         Example:
             >>> twin.error_ode(e=[0.1, 0, 0, 0, 0, 0], x_ref=[1, 0, 0, 0, 0, 0, 0.5])["e_dot"][:3]
             DM([0, -0.05, 0])
         """
-        x_ref, e, a_ref = (ca.SX.sym(*s) for s in (("x_ref", 7), ("e", 6), ("acceleration_ref", 3)))
+        size = self.x.numel()
+        sizes = (("x_ref", size), ("e", size - 1), ("acceleration_ref", size - 4))
+        x_ref, e, a_ref = (ca.SX.sym(*s) for s in sizes)
         x = ca.vertcat(retracted(x_ref, e, self.error_form)[:4], x_ref[4:] + e[3:])
         acceleration = self._model.ode(x, self._turning_inputs, self._c)[4:]
-        e_dot = error_rate(e, x_ref[4:], acceleration, a_ref, self.error_form)
+        e_dot = error_rate(e, x_ref[4:7], acceleration, a_ref, self.error_form)
         args = {"e": e, "u": self.u, "p": self.p, "x_ref": x_ref, "acceleration_ref": a_ref}
         return self._function("error_ode", args, {"e_dot": e_dot})
 
@@ -198,11 +201,11 @@ class Twin(Plant):
 
     @cached_property
     def trim(self) -> TwinFunction:
-        """x, p -> u, (m,), whose torque keeps the angular velocity of x constant; its forces are zero.
+        """x, p -> u, (m,), whose torque keeps the angular velocity of x constant; motors and forces are zero.
 
-        The torque is omega x (J omega + h), (3,) [N m], body axes, h the momentum of moving ports, less that
-        of gravity's gradient: a relative equilibrium. Without h and gravity it is zero for spins about
-        `principal` axes.
+        The torque is omega x (J omega + h), (3,) [N m], body axes, h the momentum of moving ports and of
+        wheels, less that of gravity's gradient: a relative equilibrium. Without h and gravity it is zero for
+        spins about `principal` axes.
 
         Example:
             >>> u = twin.trim(twin.x_start, twin.p_start)
@@ -210,10 +213,11 @@ class Twin(Plant):
             True
         """
         self.check_torque("trim")
-        omega = self.x[4:]
+        omega = self.x[4:7]
         torque = ca.cross(omega, self._turning @ omega + self._spin)
-        if self._field is not None:
-            torque = torque - self._field.torque(self.x[:4], self._place[:3])
+        field = self._dynamics.field
+        if field is not None:
+            torque = torque - field.torque(self.x[:4], self._place[:3])
         u = ca.vertcat(torque, ca.SX.zeros(len(self.u_names) - 3))
         return self._function("trim", {"x": self.x, "p": self.p}, {"u": u})
 
@@ -223,7 +227,8 @@ class Twin(Plant):
 
         The law's tensor is J for "tensor", its diagonal for "principal", the unit tensor for the others. A
         spin about a column of axes needs no torque: about the first and last it is stable, about the middle
-        one it is not.
+        one it is not. With wheels it is J less what they have about their axes, and that holds where they
+        hold no momentum.
 
         Example:
             >>> moments, axes = twin.principal(twin.p_start)
@@ -241,13 +246,14 @@ class Twin(Plant):
         Gravity's gradient is a torque: along an orbit neither is constant.
 
         Both are formed with the law's tensor, as in `principal`: "decoupled" and "none" keep the angular
-        velocity itself, and the unit tensor stands for J.
+        velocity itself, and the unit tensor stands for J. Momenta of wheels are part of the angular momentum,
+        not of the energy, which is constant where no motor acts.
 
         Example:
             >>> round(float(twin.invariants(twin.x_start, twin.p_start)[0]), 3)
             198.191
         """
-        omega = self.x[4:]
+        omega = self.x[4:7]
         momentum = self._turning @ omega
         results = {
             "kinetic_energy": 0.5 * ca.dot(omega, momentum),
@@ -273,36 +279,40 @@ class Twin(Plant):
             max(abs(v) for v, g in zip(self.p_start, groups, strict=True) if g == group) or 1.0
             for group in groups
         ]
-        return Scales(np.array([1.0] * 4 + [*rate]), torque, np.array(p), np.array([1.0] * 3 + [*rate]), time)
+        moving = [*rate, *[moment / time] * len(self.scene.wheels)]
+        return Scales(np.array([1.0] * 4 + moving), torque, np.array(p), np.array([1.0] * 3 + moving), time)
 
-    def check_torque(self, what: str) -> None:
+    def check_torque(self, what: str, *, motors: bool = False) -> None:
         """Raises ValueError where the scene has no torque input, which `what` needs.
+
+        motors : whether a motor of a wheel does as well
 
         Example:
             >>> twin.check_torque("my controller")
         """
-        if not self.scene.inputs.torque:
+        inputs = self.scene.inputs
+        if not (inputs.torque or (motors and inputs.wheel)):
             raise ValueError(
                 f'{what}: scene "{self.scene.name}" has no torque input; put "torque = true" under [inputs]'
             )
 
     @cached_property
     def _spin(self) -> ca.SX:
-        """h, (3,) [N m s], body axes, of moving parts; zero where the law has no gyroscopic term."""
-        known = "momentum" in self._model.slices.composite and LAWS[self.scene.rotation.law].gyroscopic_term
-        return self._c[self._model.slices.composite["momentum"]][:3] if known else ca.SX.zeros(3)
+        """h, (3,) [N m s], body axes, of moving parts and wheels; zero where the law has no gyroscopic
+        term."""
+        held = self._dynamics.held_momentum(self.x)
+        return ca.SX.zeros(3) if held is None else held
 
     @cached_property
-    def _field(self) -> Field | None:
-        """The field of gravity, of the twin's own expressions."""
+    def _dynamics(self) -> Dynamics:
+        """The quantities in the equation of rotation under u and p."""
         parts = {name: self._c[place] for name, place in self._model.slices.composite.items()}
-        return field_of(self._model.resolved, parts, self._turning_inputs)
+        return dynamics_of(self._model.resolved, parts, self._turning_inputs)
 
     @cached_property
     def _turning(self) -> ca.SX:
         """The tensor, (3, 3) [kg m2], body axes, whose free motion is the law's: `RotationLaw.turning`."""
-        inertia = from_upper_triangle(self._c[composite_slices()["inertia"]])
-        return LAWS[self.scene.rotation.law].turning(inertia)
+        return self._dynamics.law.turning(self._dynamics.turning)
 
     def generate(
         self,
@@ -368,7 +378,9 @@ class Twin(Plant):
             columns = (held, ca.repmat(at["p"], 1, sub_steps), ca.repmat(size, 1, sub_steps))
             end = self.step.fold(sub_steps)(at["x"], *columns)
         blocks = [ca.jacobian(end, known) for known in at.values()]
-        jacobian = ca.Function(f"jac_{compiled.name()}", [*at.values(), ca.MX.sym("x_next", 7)], blocks)
+        jacobian = ca.Function(
+            f"jac_{compiled.name()}", [*at.values(), ca.MX.sym("x_next", self.x.numel())], blocks
+        )
         inputs = ca.Function("inputs", [self.p], [self._inputs])(at["p"])
         first = len(self._model.names.p) + len(self._model.names.k)  # of the place in a field of gravity
         x_next = compiled(at["x"], ca.vertcat(at["u"], inputs[first:]), inputs[:first], at["h"])
@@ -380,25 +392,26 @@ class Twin(Plant):
         """Returns the plant as `acados_template.AcadosModel`: x, u, p, explicit and implicit ode.
 
         step : [s], for discrete dynamics, disc_dyn_expr, by `step`
-        Raises ImportError without acados_template, ValueError for a scene without torque input.
+        Raises ImportError without acados_template, ValueError for a scene without torque and motor inputs.
 
         Example:
             >>> model = twin.to_acados(step=0.5)  # doctest: +SKIP
         """
-        self.check_torque("to_acados")
+        self.check_torque("to_acados", motors=True)
         return acados_model(self, step)
 
     def to_do_mpc(self, step: float | None = None) -> Any:
         """Returns the plant as `do_mpc.model.Model`, not yet set up: states attitude and angular_velocity.
 
-        Input torque (u where forces act too), parameter p. Add what your cost needs, then call its setup().
+        With wheels their momenta are a state too, momentum. Input torque (u where others act too), parameter
+        p. Add what your cost needs, then call its setup().
         step : [s], for a discrete model by `step`; None: a continuous one
-        Raises ImportError without do_mpc, ValueError for a scene without torque input.
+        Raises ImportError without do_mpc, ValueError for a scene without torque and motor inputs.
 
         Example:
             >>> model = twin.to_do_mpc(step=0.5)  # doctest: +SKIP
         """
-        self.check_torque("to_do_mpc")
+        self.check_torque("to_do_mpc", motors=True)
         return do_mpc_model(self, step)
 
     def to_dae(self) -> dict[str, ca.SX]:

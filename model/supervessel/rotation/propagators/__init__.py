@@ -69,15 +69,17 @@ def plan_of(scene: "Scene") -> Plan:
     if name != "auto":
         chosen = PROPAGATORS[name]
         return Plan(chosen if chosen.build else None, chosen.free)
-    inputs = scene.inputs
-    if not any(listed(dict(inputs))):
+    if scene.wheels:
+        return Plan(PROPAGATORS[stepping(scene)], "never")
+    if not any(listed(dict(scene.inputs))):
         return Plan(None, "always")
     return Plan(PROPAGATORS[stepping(scene)], "while free")
 
 
 def stepping(scene: "Scene") -> str:
     """Returns the name of the method that "auto" takes where the motion is not free."""
-    return "dop853" if PROPAGATORS["taylor"].suits(scene.rotation.law, dict(scene.inputs)) else "taylor"
+    reason = PROPAGATORS["taylor"].reason_against(scene.rotation.law, dict(scene.inputs), bool(scene.wheels))
+    return "dop853" if reason else "taylor"
 
 
 def description(scene: "Scene") -> str:

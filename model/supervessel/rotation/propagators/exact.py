@@ -9,7 +9,7 @@ import casadi as ca
 from supervessel.rotation.attitude import product, unit
 from supervessel.rotation.laws import principal_products
 from supervessel.rotation.propagators import free_motion, theta
-from supervessel.rotation.propagators.method import Propagator
+from supervessel.rotation.propagators.method import NOT_FREE, Propagator
 
 STATE_SIZE = 7
 
@@ -157,4 +157,5 @@ PROPAGATOR = Propagator(
     c_files=("free_step", "free_motion"),
     marker="P",
     setting="",
+    wheels=NOT_FREE + "the momentum that they hold turns the body otherwise than free motion",
 )

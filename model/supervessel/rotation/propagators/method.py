@@ -74,6 +74,9 @@ Setting = Literal["max_angle_step", "tolerance", ""]
 
 STILL_PARTS = 'must be "auto", "rk4", "dop853" or "exact" where inputs.motion lists ports'
 
+NOT_FREE = 'must be "auto", "rk4" or "dop853" in a scene with wheels: '
+"""Beginning of why a method does not suit wheels."""
+
 
 def suits_any(law: str, inputs: Mapping[str, Any]) -> str:
     """Returns "": a method that suits every scene."""
@@ -93,6 +96,7 @@ class Propagator:
     marker  : of its points in plots, as matplotlib names it
     setting : what sets its steps
     suits   : rotation law and table `[inputs]` -> why it makes no sense with them, "" where it does
+    wheels  : why it makes no sense in a scene with wheels, "" where it does
     safety  : by how much the sum of estimates may exceed the tolerance: they are that much too large
               (measured in tests/model/test_controlled.py)
     """
@@ -105,4 +109,9 @@ class Propagator:
     marker: str
     setting: Setting = "tolerance"
     suits: Callable[[str, Mapping[str, Any]], str] = suits_any
+    wheels: str = ""
     safety: float = 1.0
+
+    def reason_against(self, law: str, inputs: Mapping[str, Any], has_wheels: bool) -> str:
+        """Returns why the method makes no sense in a scene, "" where it does; law, inputs : as of `suits`."""
+        return (self.wheels if has_wheels else "") or self.suits(law, inputs)

@@ -11,7 +11,13 @@ import casadi as ca
 
 from supervessel.rotation.gravity import Field
 from supervessel.rotation.propagators.dop853 import runge_kutta_end
-from supervessel.rotation.propagators.method import STILL_PARTS, Propagator, Step, StepSymbols
+from supervessel.rotation.propagators.method import (
+    NOT_FREE,
+    STILL_PARTS,
+    Propagator,
+    Step,
+    StepSymbols,
+)
 from supervessel.scene.inputs import acting
 
 
@@ -68,4 +74,5 @@ PROPAGATOR = Propagator(
     c_files=("split", "tried_steps", "estimated_steps", "free_motion"),
     marker="v",
     suits=_suits,
+    wheels=NOT_FREE + "between kicks the momentum that they hold turns the body otherwise than free motion",
 )

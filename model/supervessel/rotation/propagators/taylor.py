@@ -9,7 +9,13 @@ import casadi as ca
 
 from supervessel.rotation.attitude import unit
 from supervessel.rotation.propagators.gradient_series import GradientSeries
-from supervessel.rotation.propagators.method import STILL_PARTS, Propagator, Step, StepSymbols
+from supervessel.rotation.propagators.method import (
+    NOT_FREE,
+    STILL_PARTS,
+    Propagator,
+    Step,
+    StepSymbols,
+)
 
 LEAST_ORDER, MOST_ORDER = 6, 20
 HALF_ORDER_AT_1, HALF_ORDER_SLOPE = 2.75, 0.29
@@ -169,5 +175,6 @@ PROPAGATOR = Propagator(
     c_files=("taylor", "taylor_series", "estimated_steps"),
     marker="D",
     suits=_suits,
+    wheels=NOT_FREE + "its series know no momentum but the body's own",
     safety=2.5,
 )
