@@ -85,21 +85,17 @@ static void project_attitude_start(Instance *instance, double v[4]) {
     for (size_t i = 0; i < 4; i++) v[i] = (v[i] - q[i] * along) / length;
 }
 
-/* Where the variation of a start parameter's state stands: of the angular velocity's three, the attitude's four, those
-   of wheels. */
-static size_t place_of_start(unsigned reference) {
-    if (reference < REFERENCE_ATTITUDE_START) return 4 + reference - REFERENCE_RATE_START;
-    const size_t after = reference - REFERENCE_ATTITUDE_START;
-    return after < 4 ? after : 3 + after;
-}
-
 /* Where the variation of a variable stands, or NULL: time changes nothing. Start parameters vary the state that they
-   become. */
+   become, the angular velocity's three before the attitude's four, those of wheels after them. */
 static double *place(Variation *v, unsigned reference) {
     switch (VARIABLES[reference].role) {
         case ROLE_INPUT:
             return &v->inputs[reference - REFERENCE_P];
-        case ROLE_PARAMETER: return &v->x[place_of_start(reference)];
+        case ROLE_PARAMETER:
+            if (STATE_COUNT > 7 && reference >= REFERENCE_ATTITUDE_START + 4)
+                return &v->x[7 + reference - (REFERENCE_ATTITUDE_START + 4)];
+            return reference < REFERENCE_ATTITUDE_START ? &v->x[4 + reference - REFERENCE_RATE_START]
+                                                        : &v->x[reference - REFERENCE_ATTITUDE_START];
         case ROLE_STATE: return &v->x[reference - REFERENCE_STATES];
         case ROLE_DERIVATIVE: return &v->rate[reference - REFERENCE_DERIVATIVES];
         case ROLE_OUTPUT: return &v->y[reference - REFERENCE_OUTPUTS];
