@@ -26,6 +26,7 @@ from supervessel.rotation.propagators import PROPAGATORS
 from support import ISS_DG, OK, STEADY, Instance, body, built, scene, variant
 from support.costs import station
 from support.marks import FMI
+from wheels.scenes import CARRIER
 
 STEP, STEPS = 0.1, 100
 """s, and how many: long enough for a difference of one ulp to grow."""
@@ -163,6 +164,7 @@ SCENES = {
             "inputs": {"docked": ["berth"]},
         },
     ),
+    "wheels": CARRIER,
     "bounded": variant(body(propagator="rk4"), {"outputs.names": ["error_bound"]}),
     "many vessels": station(60, [f"v{i}" for i in range(60)]),
 }

@@ -1,0 +1,226 @@
+"""The equations of wheels: closed forms, digits, SciPy, energy and momentum."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from supervessel import Twin, reference
+from support import Array, U, body, scene, store, variant
+from support.gyrostat import Course, Gyrostat, GyrostatState
+from wheels.scenes import AXES, CARRIER, GYROSTAT, INERTIA, INERTIAS, MOTION
+
+LAW = pytest.mark.parametrize("law", ["decoupled", "principal", "tensor"])
+TORQUE, MOTORS = (2.0, -1.0, 0.5), (0.7, 0.0, -0.4)
+"""N m; the second wheel has no motor."""
+U_GIVEN = [*TORQUE, MOTORS[0], MOTORS[2]]
+
+
+@cache
+def twin(law: str = "tensor", **rotation: Any) -> Twin:
+    return Twin(
+        scene(variant(GYROSTAT, {"rotation.law": law, **{f"rotation.{k}": v for k, v in rotation.items()}}))
+    )
+
+
+def numbers(value: Any) -> Array:
+    return np.array(value).ravel()
+
+
+def outputs(of: Twin, x: Any, u: Any, p: Any) -> dict[str, Array]:
+    """Returns the outputs by name, vectors together."""
+    y = dict(zip(of.y_names, numbers(of.outputs(x, u, p)), strict=True))
+    groups = {name.partition("[")[0] for name in y}
+    return {g: np.array([v for n, v in y.items() if n.partition("[")[0] == g]) for g in groups}
+
+
+# Against other equations
+
+
+@LAW
+def test_the_rate_of_the_state_is_that_of_the_written_equations(law):
+    # K w' = M - sum u b - w x (K w + sum h b), h' = u, with K = J - A; the law keeps what it keeps of K.
+    x = np.concatenate([twin().x_start[:4], [0.3, -0.2, 0.5], [30.0, -12.0, 7.0]])
+    omega, momenta, motors = x[4:7], x[7:], np.array(MOTORS)
+    K = np.array(INERTIA) - (AXES.T * INERTIAS) @ AXES
+    K = K if law == "tensor" else np.diag(np.diag(K))
+    gyroscopic = np.cross(omega, K @ omega + momenta @ AXES) if law != "decoupled" else 0.0
+    expected = np.linalg.solve(K, np.array(TORQUE) - motors @ AXES - gyroscopic)
+    found = numbers(twin(law).ode(x, U_GIVEN, []))
+    assert np.abs(found[4:7] - expected).max() <= 64 * U * np.abs(expected).max()
+    assert found[7:].tolist() == motors.tolist()
+
+
+@LAW
+@pytest.mark.parametrize("acting", [False, True], ids=["nothing acts", "torque and motors"])
+def test_a_flight_is_the_motion_known_to_thirty_digits(law, acting):
+    of, time = twin(law), 20.0
+    known = Gyrostat(
+        INERTIA,
+        law,
+        torque=TORQUE if acting else (0, 0, 0),
+        axes=AXES.tolist(),
+        inertias=INERTIAS.tolist(),
+        motors=MOTORS if acting else (0, 0, 0),
+    )
+    start = GyrostatState(of.x_start[:4], of.x_start[4:7], momenta=of.x_start[7:])
+    end = Course(known, start, time).at(time)
+    step = of.communication_step(store())
+    found = numbers(step(of.x_start, U_GIVEN if acting else [0.0] * 5, [], time))
+    attitude, rates, momenta = (np.array(v, dtype=float) for v in (end.attitude, end.rates, end.momenta))
+    assert np.abs(found[:4] - attitude).max() <= FLIGHT
+    assert np.abs(found[4:7] - rates).max() <= FLIGHT
+    assert np.abs(found[7:] - momenta).max() <= 64 * U * np.abs(momenta).max()
+
+
+FLIGHT = 3e-13
+"""Some 5 rad by dop853 at a tolerance of 1e-14."""
+
+
+def test_free_motion_with_wheels_is_scipys():
+    of, time = twin(), 10.0
+
+    def rate(_: float, y: Array) -> Array:
+        wheels = reference.Wheels(AXES, INERTIAS, of.x_start[7:], np.zeros(3))
+        K = np.array(INERTIA) - wheels.inertia
+        acceleration = reference.angular_acceleration("tensor", K, y[4:], np.zeros(3), wheels.momentum)
+        return np.concatenate([reference.attitude_dot(y[:4], y[4:]), acceleration])
+
+    done = solve_ivp(rate, (0.0, time), of.x_start[:7], "DOP853", rtol=3e-14, atol=1e-17)
+    found = numbers(of.communication_step(store())(of.x_start, [0.0] * 5, [], time))
+    assert np.abs(found[:7] - done.y[:, -1]).max() <= 1e-13
+
+
+# Closed forms
+
+
+def symmetric(momentum: float, inertia: float, **rotation: Any) -> Twin:
+    """Returns the twin of a body of moments 6, 6, 9 kg m2 with a wheel on its axis."""
+    wheel = {"axis": [0, 0, 2.0], "inertia": inertia, "momentum": momentum}
+    raw = variant(
+        body(3.0, (2.0, 2.0, 3.0), propagator="dop853", **rotation),
+        {"vessels.B.wheels.w": wheel, "inputs.wheel": ["B.w"]},
+    )
+    return Twin(scene(raw))
+
+
+def test_a_wheel_on_the_axis_of_a_symmetric_body_turns_the_transverse_rate():
+    a, c, inertia, momentum, spin, time = 6.0, 9.0, 1.25, 4.0, 0.5, 12.0
+    of = symmetric(momentum, inertia, angular_velocity=[0.1, 0.0, spin])
+    states = of.rollout(600)(x=of.x_start, h=time / 600)["x_next"].full()
+    angle = ((c - inertia - a) * spin + momentum) / a * time
+    assert np.abs(states[4:7, -1] - [0.1 * np.cos(angle), 0.1 * np.sin(angle), spin]).max() <= 1e-13
+
+
+def test_a_wheel_that_spins_up_and_down_turns_the_body_by_a_known_angle():
+    c, inertia, torque, time = 9.0, 1.25, 0.3, 4.0
+    of = symmetric(0.0, inertia)
+    u = np.zeros((4, 80))
+    u[3] = torque * np.where(np.arange(80) < 40, 1.0, -1.0)
+    end = of.rollout(80)(x=of.x_start, u=u, h=time / 40)["x_next"].full()[:, -1]
+    angle = -torque * time**2 / (c - inertia)
+    assert np.abs(end - [np.cos(angle / 2), 0, 0, np.sin(angle / 2), 0, 0, 0, 0]).max() <= 1e-13
+
+
+@pytest.mark.parametrize("of", [twin(), Twin(scene(CARRIER))], ids=["a body alone", "a carrier"])
+def test_the_angular_momentum_stays_where_only_motors_act(of):
+    u = [1.0 if name.count(".") == 2 else 0.0 for name in of.u_names]
+    states = of.rollout(500)(x=of.x_start, u=u, h=0.01)["x_next"].full()
+    before, after = (outputs(of, x, u, of.p_start)["angular_momentum"] for x in (of.x_start, states[:, -1]))
+    assert np.abs(after - before).max() <= 1e-12 * np.abs(before).max()
+    assert np.abs(states[4:7, -1] - of.x_start[4:7]).max() > 0.01  # rad/s
+
+
+def test_energy_grows_by_the_work_of_torques_and_motors():
+    # 1/2 w.(J - A) w + sum h^2/(2 I): M.w does work, and each motor u times its speed; one without inertia
+    # -u b.w. Work is added up by the Gauss-Legendre rule of 6 nodes in each interval.
+    of, h, count = twin(), 0.1, 60
+    nodes, weights = np.polynomial.legendre.leggauss(6)
+
+    def power(x: Array) -> float:
+        y = outputs(of, x, U_GIVEN, [])
+        store = -U_GIVEN[4] * float(AXES[2] @ x[4:7])
+        return float(np.dot(TORQUE, x[4:7]) + U_GIVEN[3] * y["B.x.speed"][0] + store)
+
+    def energy(x: Array) -> float:
+        stored = x[7:9] ** 2 / (2.0 * INERTIAS[:2])
+        return float(outputs(of, x, U_GIVEN, [])["kinetic_energy"][0] + stored.sum())
+
+    x, work = of.x_start, 0.0
+    for _ in range(count):
+        at = [numbers(of.step(x, U_GIVEN, [], 0.5 * h * (1.0 + node))) for node in nodes]
+        work += 0.5 * h * float(np.dot(weights, [power(y) for y in at]))
+        x = numbers(of.step(x, U_GIVEN, [], h))
+    assert abs(energy(x) - energy(of.x_start) - work) <= 1e-12 * energy(x)
+    assert abs(work) > 1.0  # J
+
+
+# Vessels that move and leave
+
+
+def moving(of: Twin) -> tuple[Array, Array]:
+    """Returns p with the arm in motion, and a state."""
+    p = of.p_start.copy()
+    for name, value in MOTION.items():
+        p[of.p_names.index(name)] = value
+    return p, of.x_start
+
+
+def test_the_shares_of_vessels_add_up_to_the_angular_momentum_of_the_whole():
+    of = Twin(scene(CARRIER))
+    y = outputs(of, of.x_start, [0.0] * 5, moving(of)[0])
+    size = np.abs(y["A.angular_momentum"]).max()
+    assert (
+        np.abs(y["A.angular_momentum"] + y["B.angular_momentum"] - y["angular_momentum"]).max()
+        <= 64 * U * size
+    )
+
+
+def test_the_speed_of_a_wheel_is_relative_to_its_vessel():
+    of = Twin(scene(CARRIER))
+    p, x = moving(of)
+    values = dict(zip(of.p_names, p, strict=True))
+    there = reference.motions(of.scene, values)["B"]
+    axis = there.rotation @ np.array([0.0, 1.0, 1.0]) / np.sqrt(2.0)
+    y = outputs(of, x, [0.0] * 5, p)
+    assert abs(y["B.y.speed"][0] - (3.0 / 1.0 - axis @ (x[4:7] + there.rate))) <= 64 * U * 3.0
+    assert y["A.x.speed"][0] == 20.0 / 3.0 - x[4]
+
+
+def test_a_wheel_of_a_vessel_that_has_left_keeps_its_momentum_and_has_no_effect():
+    of, alone = (
+        Twin(scene(CARRIER)),
+        Twin(
+            scene(
+                variant(
+                    CARRIER, {"vessels.B.wheels": None, "inputs.wheel": ["A.x"], "outputs.names": ["mass"]}
+                )
+            )
+        ),
+    )
+    p = of.p_with({"dock.docked": 0.0})
+    x_dot = numbers(of.ode(of.x_start, [0.1, 0.2, 0.3, 0.4, 0.5], p))
+    assert x_dot[8:].tolist() == [0.0, 0.0]
+    same = alone.ode(alone.x_start, [0.1, 0.2, 0.3, 0.4], alone.p_with({"dock.docked": 0.0}))
+    assert x_dot[:8].tolist() == numbers(same).tolist()
+    y = outputs(of, of.x_start, [0.0] * 5, p)
+    assert [y["B.y.momentum"][0], y["B.y.speed"][0]] == [3.0, 0.0]
+
+
+def test_rk4_is_as_fine_as_the_momentum_of_wheels_asks_for():
+    # All but at rest, the body nutates as fast as its wheel makes it, not as fast as it turns.
+    of = symmetric(400.0, 1.25, angular_velocity=[1e-6, 0.0, 0.0])
+    longest = float(of.longest_step(of.x_start, [0.0] * 4, []))
+    assert longest * 400.0 / 6.0 <= of.scene.rotation.max_angle_step
+    pushed = float(of.longest_step(of.x_start * [1, 1, 1, 1, 1, 1, 1, 0], [0.0, 0, 0, 50.0], []))
+    assert 50.0 * pushed / 6.0 * pushed <= of.scene.rotation.max_angle_step
+
+
+def test_principal_axes_are_those_of_the_tensor_without_wheels():
+    K = np.array(INERTIA) - (AXES.T * INERTIAS) @ AXES
+    moments, axes = (np.array(part) for part in twin().principal([]))
+    assert np.abs(axes @ np.diag(moments.ravel()) @ axes.T - K).max() <= 64 * U * np.abs(K).max()
+    J = outputs(twin(), twin().x_start, [0.0] * 5, [])["inertia"]
+    assert J.tolist() == np.ravel(INERTIA).tolist()
