@@ -46,7 +46,8 @@ Status instance_check_attitude(Instance *instance) {
 
 bool are_within(const double numbers[], size_t count, double limit) {
     bool within = true;
-    for (size_t i = 0; i < count; i++) within = within && fabs(numbers[i]) <= limit;
+    /* islessequal, unlike <=, raises no floating-point exception for a NaN, whoever the compiler is */
+    for (size_t i = 0; i < count; i++) within = within && islessequal(fabs(numbers[i]), limit);
     return within;
 }
 

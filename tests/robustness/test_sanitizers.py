@@ -28,7 +28,8 @@ SUITE_TIME_LIMIT = 3600.0  # s; about ten minutes on two cores
 LIBRARIES = 100
 """The suite flies more of them; fewer would say that it flies others, without sanitizers."""
 PROPAGATORS = [(2, "rk4"), (3, "rk4"), (2, "auto"), (3, "auto"), (3, "split")]
-SCENES = [(fmi, scene) for scene in ("moving", "mixed", "docks", "capture", "bounded") for fmi in (2, 3)]
+NAMES = ("moving", "mixed", "docks", "capture", "bounded", "orbiting", "gradient")
+SCENES = [(fmi, scene) for scene in NAMES for fmi in (2, 3)]
 BUILDS = pytest.mark.parametrize(("fmi", "propagator"), [*PROPAGATORS, *SCENES])
 """FMI version, and propagator of RAW or one of CHANGING."""
 SANITIZED = (
@@ -113,6 +114,10 @@ MOVING = variant(
 )
 DOCKS = [{"name": "berth", "ports": ["A.fore", "B.aft"]}, {"name": "tail", "ports": ["B.fore", "C.aft"]}]
 RIVAL = {"name": "rival", "ports": ["A.fore", "C.aft"], "docked": False}
+ORBIT = {
+    "inputs.gravity": True,
+    "gravity": {"mu": 4e14, "position": [6e6, 3e6, -1e6], "velocity": [-2e3, 6e3, 4e3]},
+}
 CHANGING = {
     "moving": MOVING,
     "mixed": variant(MOVING, {"rotation.mass_change": "rate"}),
@@ -135,9 +140,23 @@ CHANGING = {
             "outputs.names": [*MOVING["outputs"]["names"], "error_bound"],
         },
     ),
+    "orbiting": variant(
+        MOVING,
+        ORBIT
+        | {
+            "docks": DOCKS,
+            "inputs.docked": ["berth", "tail"],
+            "vessels.A.wheels": {"w": {"axis": [0.0, 1.0, 2.0], "inertia": 30.0, "momentum": 400.0}},
+            "vessels.C.wheels": {"w": {"axis": [1.0, 0.0, 0.0], "momentum": -50.0}},
+            "inputs.wheel": ["C.w"],
+            "outputs.names": [*MOVING["outputs"]["names"], "A.w.momentum", "A.w.speed"],
+        },
+    ),
+    "gradient": variant(RAW, ORBIT | {"rotation.propagator": "taylor", "rotation.tolerance": 1e-3}),
 }
 """Scenes with forces: a port moves and all changes keep momentum, or poses alone do; docks open and close
-beside, or two of them at one port by turns; the bound of a cheap law's error is carried along all that."""
+beside, or two of them at one port by turns; the bound of a cheap law's error is carried along all that;
+wheels and gravity's gradient besides; and the gradient without these, by Taylor series."""
 
 
 @cache

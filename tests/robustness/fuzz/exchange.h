@@ -113,7 +113,9 @@ static Answer change_mode(Slot *slot) {
 #endif
     if (wants_event) {
         called = EITHER("fmi2EnterEventMode", "fmi3EnterEventMode");
-        answer.expected = slot->now.state & before_event ? FINE : AN_ERROR;
+        /* what was set in continuous time is judged there, at the latest */
+        const unsigned judged = CHANGES && slot->now.state == CONTINUOUS ? EITHER(ANYTHING, NO_ERROR) : FINE;
+        answer.expected = slot->now.state & before_event ? judged : AN_ERROR;
         answer.status = (int)EITHER(fmi2EnterEventMode, fmi3EnterEventMode)(slot->component);
         if (answer.status == OK) slot->now.state = EVENT;
         return answer;
