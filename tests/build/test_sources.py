@@ -26,6 +26,7 @@ from supervessel.rotation.propagators import PROPAGATORS
 from support import ISS_DG, OK, STEADY, Instance, body, built, scene, variant
 from support.costs import station
 from support.marks import FMI
+from support.orbits import EARTH, ORBIT
 from wheels.scenes import CARRIER
 
 STEP, STEPS = 0.1, 100
@@ -165,6 +166,7 @@ SCENES = {
         },
     ),
     "wheels": CARRIER,
+    "field": variant(body(propagator="taylor"), {"inputs.gravity": True, "gravity": {"mu": EARTH, **ORBIT}}),
     "bounded": variant(body(propagator="rk4"), {"outputs.names": ["error_bound"]}),
     "many vessels": station(60, [f"v{i}" for i in range(60)]),
 }
