@@ -53,6 +53,7 @@ int docked_rate_reverse(const double **arg, double **res, int *iw, double *w, in
 int fastest_square(const double **arg, double **res, int *iw, double *w, int mem);    /* x, u, c -> rad2/s2 */
 int step(const double **arg, double **res, int *iw, double *w, int mem);              /* x, u, c, h -> x, error */
 int by_torque(const double **arg, double **res, int *iw, double *w, int mem);         /* u, c -> rad/s2 */
+int held(const double **arg, double **res, int *iw, double *w, int mem);              /* x, u, c -> see taylor_series.h */
 int rounding(const double **arg, double **res, int *iw, double *w, int mem);          /* x, u, c, h -> rad */
 int bound_step(const double **arg, double **res, int *iw, double *w, int mem);        /* x, u, c, a, s, b -> b */
 int bound_kept_rate(const double **arg, double **res, int *iw, double *w, int mem);   /* b[1], c, d -> b[1] */

@@ -1,7 +1,8 @@
 /* Sub-steps of the propagator taylor: how long the series of taylor_series.c are followed, by the estimate of their
    error.
 
-   Needs of the model: by_torque, the acceleration by torque, and the map in a that says what the law's products are. */
+   Needs of the model: by_torque, the acceleration by torque, and the map in a that says what the law's products are;
+   with wheels held, the momentum that they hold and its rate. */
 #include <string.h>
 
 #include "composite.h"
@@ -64,6 +65,14 @@ Status solver_sub_step(Instance *instance, Progress *progress) {
     const double *x = instance_x(instance), *map = &instance->now.a[AXES_SERIES];
     Series series;
     series.order = progress->exponent - 1;
+#ifdef AXES_RESPONSE
+    double stored[STATE_COUNT - 1];
+    instance_set_arguments(instance);
+    instance->res[0] = stored;
+    held(instance->arg, instance->res, instance->iw, instance->w, 0);
+    series.held = stored;
+    series.response = &instance->now.a[AXES_RESPONSE];
+#endif
 #if FIELD
     series.field = field_of(instance);
     series.gradient = &instance->now.a[AXES_GRADIENT];
@@ -89,6 +98,9 @@ Status solver_sub_step(Instance *instance, Progress *progress) {
         double rest[3];
         memcpy(rest, progress->rest, sizeof rest);
         taylor_sum(&series, x, map, share, next, rest);
+#ifdef AXES_RESPONSE
+        for (size_t i = 7; i < STATE_COUNT; i++) next[i] = x[i] + taken * stored[i - 1];
+#endif
         if (isfinite(found) && is_finite(next)) {
             const double error = share == 1.0 ? found : AIM * allowed * share;
             const double part = share == 1.0 ? 1.0 : error / (found > 0.0 ? found : 1.0);

@@ -2,6 +2,7 @@
 #include "taylor_series.h"
 
 #include <math.h>
+#include <stddef.h>
 
 #if FIELD
 #include "gradient_series.h"
@@ -77,6 +78,30 @@ static void estimate(Series *series) {
     series->error[1] = remainder_of(before[1], after[1]);
 }
 
+#ifdef AXES_RESPONSE
+
+/* Adds to coefficient k + 1 of the rates the part of -w x S, the rates being known up to k. */
+static void add_stored(int k, double step, Series *series) {
+    const double *w = series->rates[k], *before = k > 0 ? series->rates[k - 1] : NULL;
+    const double *S = series->stored[0], *gain = series->stored[1];
+    for (int i = 0; i < 3; i++) {
+        const int j = (i + 1) % 3, l = (i + 2) % 3;
+        double turning = w[j] * S[l] - w[l] * S[j];
+        if (before) turning += before[j] * gain[l] - before[l] * gain[j];
+        series->rates[k + 1][i] -= step * series->response[i] * turning / (k + 1);
+    }
+}
+
+static void begin_stored(const double map[], double step, Series *series) {
+    double gain[3];
+    for (int i = 0; i < 3; i++) gain[i] = step * series->held[3 + i];
+    from_body(map, series->held, series->stored[0]);
+    from_body(map, gain, series->stored[1]);
+    add_stored(0, step, series);
+}
+
+#endif
+
 #if FIELD
 
 /* Begins the series of position and velocity, and adds the gradient's part to the first change of the rates. */
@@ -133,6 +158,9 @@ void taylor_series(const double x[7], const double acceleration[3], const double
         pull[i] = step * map[i];
         rates[1][i] = pull[i] * (w[(i + 1) % 3] * w[(i + 2) % 3]) + rates[1][i];
     }
+#ifdef AXES_RESPONSE
+    if (GYROSCOPIC) begin_stored(map, step, series);
+#endif
 #if FIELD
     Gradient gradient;
     begin_field(x, map, step, series, &gradient);
@@ -154,6 +182,9 @@ void taylor_series(const double x[7], const double acceleration[3], const double
             rate[2] = (scale * pull[2]) * (s[7] + (w[0] * v[1] + v[0] * w[1]));
         }
         if (k + 1 < order) spread(p, v, step, ones[k].of, others[k].of);
+#ifdef AXES_RESPONSE
+        if (GYROSCOPIC) add_stored(k, step, series);
+#endif
 #if FIELD
         follow_field(k, step, series, &gradient);
 #endif

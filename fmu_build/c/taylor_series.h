@@ -10,6 +10,10 @@
    rates : of the angular velocity [rad/s]
    error : estimate of what the series leave out at s = 1: attitude [rad], angular velocity [rad/s]; like
            s^(order + 1)
+   In a scene with wheels, where held and response are set before the series are found:
+   held     : their momentum S at x [N m s] and its rate [N m], which is constant, both in body axes
+   response : in the axes of the map, the acceleration by a torque over that torque [1/(kg m2)]
+   stored   : S and its gain over the step, in the axes of the map
    In a field of gravity, where field and gradient are set before the series are found:
    field            : position [m] and velocity [m/s] from the attracting centre at x, inertial axes
    gradient         : the map of products of the direction to the acceleration, in the axes of the map
@@ -18,6 +22,10 @@
 typedef struct {
     double turn[TAYLOR_MOST_ORDER + 1][4], rates[TAYLOR_MOST_ORDER + 1][3], error[2];
     int order;
+#ifdef AXES_RESPONSE
+    const double *held, *response;
+    double stored[2][3];
+#endif
 #if FIELD
     const double *field, *gradient;
     double distance, place[TAYLOR_MOST_ORDER + 1][3], motion[TAYLOR_MOST_ORDER + 1][3];

@@ -57,7 +57,7 @@ def picked_files(model: Equations, has_loop: bool) -> frozenset[str]:
         | bound
         | stages
         | _for_field(model)
-        | (MOTORS if wheel_constants(model) else frozenset())
+        | (MOTORS if "MOTOR_COUNT" in wheel_constants(model) else frozenset())
         | (LOOP if has_loop else frozenset())
     )
 

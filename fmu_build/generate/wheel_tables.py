@@ -1,5 +1,4 @@
-"""C macro and table about motors of wheels whose vessels docks can take off the root: there they must
-rest."""
+"""C macros about wheels, and a table of motors that must rest while docks let go of the wheels' vessels."""
 
 from supervessel.composite.wheels import may_leave
 from supervessel.equations import Equations
@@ -7,10 +6,19 @@ from supervessel.scene.inputs import vessel_of
 
 
 def wheel_constants(model: Equations) -> dict[str, int]:
-    """Returns MOTOR_COUNT, the number of rows of MOTORS, in a scene that has any; see
-    fmu_build/c/motors.h."""
-    rows = _rows(model)
-    return {"MOTOR_COUNT": len(rows)} if rows else {}
+    """Returns macros about wheels, each only where a scene needs it.
+
+    MOTOR_COUNT   : number of rows of MOTORS, see fmu_build/c/motors.h
+    AXES_RESPONSE : with Taylor steps: place in a of the response to a torque, see taylor_series.h there; 0
+                    under a law without products, which does not ask for it
+    """
+    rows, found = _rows(model), dict[str, int]()
+    if rows:
+        found["MOTOR_COUNT"] = len(rows)
+    if any(function.name() == "held" for function in model.steps.propagation):
+        place = model.slices.axes.get("response")
+        found["AXES_RESPONSE"] = 0 if place is None else place.start
+    return found
 
 
 def wheel_tables(model: Equations) -> str:

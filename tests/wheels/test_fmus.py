@@ -66,6 +66,20 @@ def test_the_step_of_the_twin_is_a_sub_step(fmi):
     instance.free()
 
 
+def test_the_taylor_step_of_the_twin_is_a_sub_step_within_rounding():
+    raw = variant(GYROSTAT, {"rotation.propagator": "taylor"})
+    of, instance = Twin(scene(raw)), Instance(raw)
+    u, h = np.linspace(-0.4, 0.5, 5), 0.2
+    assert instance.initialise(**dict(zip(of.u_names, u, strict=True))) == OK
+    x = of.x_start
+    for _ in range(5):
+        assert instance.step(h) == OK, instance.log
+        x = np.array(of.step(x, u, of.p_start, h)).ravel()
+    size = np.maximum(np.abs(x), 0.1)
+    assert (np.abs(state(instance) - x) / size).max() <= 64 * U
+    instance.free()
+
+
 @FMI
 def test_start_parameters_set_the_momenta(fmi):
     instance = Instance(CARRIER, fmi)

@@ -5,13 +5,15 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from supervessel.composite.inertia import congruence
 from supervessel.composite.resolved import ResolvedScene
 from supervessel.derivatives import GivenDerivative
 from supervessel.layout import stacked
 from supervessel.rotation.attitude import rotation_matrix
 from supervessel.rotation.dynamics import Dynamics
 from supervessel.rotation.error_bound.constants import constants_of, stored
-from supervessel.rotation.laws import LAWS, principal_products
+from supervessel.rotation.gravity import Field
+from supervessel.rotation.laws import LAWS, gyroscopic_torque, principal_products
 from supervessel.rotation.principal import principal, principal_forward, quaternion_of_axes
 from supervessel.rotation.propagators import Plan
 
@@ -41,6 +43,8 @@ def axes_graph(resolved: ResolvedScene, plan: Plan, dynamics: Dynamics, products
                 then, unless body axes are principal axes, R_body_principal, (9,), column by column
     gradient  : for Taylor steps in a field of gravity: the map of products to the acceleration in the axes of
                 `series`, (3,) or, column by column, (18,), see `Field.gradient_map`
+    response  : (3,) [1/(kg m2)], for Taylor steps with wheels under a law with products: the acceleration by
+                a torque over that torque, element by element in the axes of `series`
     bound     : (n,), where error_bound is an output: see `rotation.error_bound.constants.stored`
     """
     inertia, turning = dynamics.inertia, dynamics.turning
@@ -61,8 +65,15 @@ def axes_graph(resolved: ResolvedScene, plan: Plan, dynamics: Dynamics, products
         parts["series"] = ca.vertcat(principal_products(moments), ca.vec(R_body_principal))
     elif in_series:
         parts["series"] = ca.diag(products) if products.numel() else ca.SX(0, 1)
+    if in_series and dynamics.wheels is not None and products.numel():
+        parts["response"] = 1.0 / moments if series_turn else _response(dynamics)
     if in_series and dynamics.field is not None:
-        parts["gradient"] = -parts["series"][:3] if products.numel() else _gradient_map(dynamics)
+        if series_turn and dynamics.wheels is not None:
+            parts["gradient"] = _turned_gradient_map(dynamics.field, moments, R_body_principal)
+        elif products.numel() and dynamics.wheels is None:
+            parts["gradient"] = -parts["series"][:3]
+        else:
+            parts["gradient"] = _gradient_map(dynamics)
     if "error_bound" in resolved.scene.outputs.names:
         parts["bound"] = stored(constants_of(dynamics))
     slices, a = stacked(parts)
@@ -74,6 +85,23 @@ def _gradient_map(dynamics: Dynamics) -> ca.SX:
     assert dynamics.field is not None
     found = dynamics.field.gradient_map(dynamics.law, dynamics.numbers)
     return ca.diag(found) if found.size2() == 3 else ca.vec(found)
+
+
+def _turned_gradient_map(field: Field, moments: ca.SX, R_body_principal: ca.SX) -> ca.SX:
+    """Returns the same, (18,), in the principal axes of J - A, in which J is not diagonal.
+
+    moments : of J - A, (3,) [kg m2]
+    """
+    inertia = congruence(R_body_principal.T, field.inertia)
+    return ca.densify(ca.vec(-(gyroscopic_torque(inertia) / ca.repmat(moments, 1, 6))))
+
+
+def _response(dynamics: Dynamics) -> ca.SX:
+    """Returns the response, see `axes_graph`, of a body whose axes are those of the series."""
+    by_axes = (
+        dynamics.law.acceleration(dynamics.numbers, ca.SX.zeros(3), e) for e in ca.horzsplit(ca.SX.eye(3))
+    )
+    return ca.diag(ca.horzcat(*by_axes))
 
 
 def axes_derivative(inertia: ca.SX, c: ca.SX, a: ca.SX, slices: Mapping[str, slice]) -> GivenDerivative:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from supervessel.rotation.axes import AxesGraph
-from supervessel.rotation.dynamics import Dynamics
+from supervessel.rotation.dynamics import Dynamics, SpunWheels
 from supervessel.rotation.error_bound.remainder import has_sure_remainder
 from supervessel.rotation.lengths import smooth_length, smooth_root
 from supervessel.rotation.propagators import PROPAGATORS, Plan
@@ -31,9 +31,10 @@ class StepFunctions:
     error_exponent : power of h with which the estimated error grows
     propagation    : the functions that the scene's co-simulation uses: of fastest_square and step as many as
                      its method needs; by_torque: u, c -> angular acceleration by the torque alone, (3,)
-                     [rad/s2], for Taylor steps; free_...: exact free motion, see `propagators.exact`;
-                     rounding: x, u, c, h -> angle [rad] by which rounding of the tensor turns the body in h,
-                     where the scene shows its error and the law has a gyroscopic term
+                     [rad/s2], for Taylor steps, and with wheels held, see `_held_function`; free_...: exact
+                     free motion, see `propagators.exact`; rounding: x, u, c, h -> angle [rad] by which
+                     rounding of the tensor turns the body in h, where the scene shows its error and the law
+                     has a gyroscopic term
     """
 
     fastest_square: ca.Function
@@ -65,6 +66,7 @@ def step_functions(
         scene.rotation.tolerance,
         estimated,
         dynamics.field,
+        dynamics.wheels,
     )
     method = plan.method or PROPAGATORS["dop853"]
     assert method.build is not None
@@ -72,15 +74,25 @@ def step_functions(
     rate_square = _rate_function(scene.rotation.max_angle_step, motion, dynamics, symbols)
     longest = _longest_step_function(scene.rotation.max_angle_step, motion, dynamics, symbols)
     step = _step_function(built, symbols, h)
-    series = ca.Function(
-        "by_torque", [*symbols[1:]], [motion.acceleration_by_torque], ["u", "c"], ["acceleration"]
-    )
+    series = [
+        ca.Function(
+            "by_torque", [*symbols[1:]], [motion.acceleration_by_torque], ["u", "c"], ["acceleration"]
+        )
+    ]
+    if dynamics.wheels is not None:
+        series.append(_held_function(dynamics.wheels, symbols))
     rounding = [_rounding_function(motion, dynamics, symbols, h)] if shown and dynamics.law.products else []
-    needed = {"angle": (rate_square, step), "error": (step,), "series": (series,)}
+    needed = {"angle": (rate_square, step), "error": (step,), "series": tuple(series)}
     stepping = needed[plan.method.control] if plan.method else ()
     return StepFunctions(
         rate_square, longest, step, built.exponent, (*stepping, *_free_motion(plan, axes), *rounding)
     )
+
+
+def _held_function(wheels: SpunWheels, symbols: tuple[ca.SX, ca.SX, ca.SX]) -> ca.Function:
+    """Returns held: x, u, c -> S = sum of h_w b_w [N m s], S' [N m], both in body axes, and h_w' [N m]."""
+    held = ca.densify(ca.vertcat(wheels.momentum(symbols[0][7:]), wheels.reaction, wheels.rate))
+    return ca.Function("held", [*symbols], [held], ["x", "u", "c"], ["held"])
 
 
 def _extended(x: ca.SX, dynamics: Dynamics) -> tuple[ca.SX, Callable[[ca.SX], ca.SX]]:

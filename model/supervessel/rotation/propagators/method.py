@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import casadi as ca
 
 if TYPE_CHECKING:
+    from supervessel.rotation.dynamics import SpunWheels
     from supervessel.rotation.gravity import Field
     from supervessel.rotation.laws import RotationLaw
 
@@ -18,15 +19,17 @@ Free = Literal["never", "always", "between kicks"]
 class StepSymbols:
     """What a step is built from, symbols or expressions of one scene.
 
-    state        : attitude and angular velocity, (7,); in a field of gravity then position [m] and velocity
-                   [m/s] from the attracting centre, inertial axes, (13,)
+    state        : attitude and angular velocity, (7,), then momenta of n wheels [N m s]; in a field of
+                   gravity then position [m] and velocity [m/s] from the attracting centre, inertial axes
     rate         : state -> its rate
     law, numbers : the rotation law and its own numbers
-    torque       : (3,) [N m], body axes, constant over the step; gravity's is another
+    torque       : (3,) [N m], body axes, constant over the step, that of motors of wheels included; gravity's
+                   is another
     step         : [s]
     tolerance    : the scene's
     with_error   : whether a method that needs no estimate for itself shall give one
     field        : the field of gravity, None where there is none
+    wheels       : None where there are none
     """
 
     state: ca.SX
@@ -38,6 +41,7 @@ class StepSymbols:
     tolerance: float
     with_error: bool
     field: "Field | None" = None
+    wheels: "SpunWheels | None" = None
 
     @property
     def acceleration_by_torque(self) -> ca.SX:
@@ -74,7 +78,7 @@ Setting = Literal["max_angle_step", "tolerance", ""]
 
 STILL_PARTS = 'must be "auto", "rk4", "dop853" or "exact" where inputs.motion lists ports'
 
-NOT_FREE = 'must be "auto", "rk4" or "dop853" in a scene with wheels: '
+NOT_FREE = 'must be "auto", "rk4", "dop853" or "taylor" in a scene with wheels: '
 """Beginning of why a method does not suit wheels."""
 
 

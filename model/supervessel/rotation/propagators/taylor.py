@@ -3,19 +3,16 @@
 from collections.abc import Mapping, Sequence
 from math import floor, log
 from operator import mul
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 
 from supervessel.rotation.attitude import unit
 from supervessel.rotation.propagators.gradient_series import GradientSeries
-from supervessel.rotation.propagators.method import (
-    NOT_FREE,
-    STILL_PARTS,
-    Propagator,
-    Step,
-    StepSymbols,
-)
+from supervessel.rotation.propagators.method import STILL_PARTS, Propagator, Step, StepSymbols
+
+if TYPE_CHECKING:
+    from supervessel.rotation.dynamics import SpunWheels
 
 LEAST_ORDER, MOST_ORDER = 6, 20
 HALF_ORDER_AT_1, HALF_ORDER_SLOPE = 2.75, 0.29
@@ -47,7 +44,8 @@ def taylor_step(motion: StepSymbols, order: int) -> tuple[ca.SX, ca.SX]:
     turn since the start p, a quaternion with p_0 = 1,
     (k + 1) w_k+1 = step (acceleration by the coefficients k of the products, and where k = 0 by torque),
     (k + 1) p_k+1 = sum over j of p_j (0, step/2 w_k-j).
-    In a field of gravity the series of `gradient_series` add to the acceleration.
+    In a field of gravity the series of `gradient_series` add to the acceleration. With wheels the torque
+    -w x S does, S = S_0 + s S_1 being their momentum: motors have a constant torque.
     The terms that hold a coefficient 0, or k, stand by themselves: nothing else waits for the latest ones.
     Source: [JZ].
     """
@@ -56,6 +54,7 @@ def taylor_step(motion: StepSymbols, order: int) -> tuple[ca.SX, ca.SX]:
     push = step * motion.acceleration_by_torque
     pull = step * law.gyroscopic(numbers)
     rates = [ca.vertsplit(state[4:7])]
+    held = None if motion.wheels is None else _Held(motion, motion.wheels)
     gradient = None if motion.field is None else GradientSeries(motion.field, law, numbers, state, step)
     start = [half * rate for rate in rates[0]]
     turns: list[list[ca.SX]] = []  # from p_1 on
@@ -64,15 +63,40 @@ def taylor_step(motion: StepSymbols, order: int) -> tuple[ca.SX, ca.SX]:
         products = ca.vertcat(*(_product(rates, i, j) for i, j in law.products))
         change = (scale * pull) @ products if law.products else ca.SX.zeros(3)
         turns.append([scale * x for x in _turn(turns, rates, step)] if k else [ca.SX(0), *start])
+        if held is not None and law.products:
+            change = change + scale * held.next(rates)
         if gradient is not None:
             change = change + scale * gradient.next(rates)
         rates.append(ca.vertsplit(ca.densify(change + push if k == 0 else change)))
     error = ca.vertcat(2.0 * _remainder(turns[-4:]), _remainder(rates[-4:]))
     attitude = state[:4] + _times(state[:4], _sum(turns))
     end = ca.vertcat(unit(attitude), state[4:7] + _sum(rates[1:]))
+    if held is not None:
+        end = ca.vertcat(end, held.end)
     if gradient is not None:
         end = ca.vertcat(end, gradient.end(end[:4]))
     return end, error
+
+
+class _Held:
+    """The momentum S of wheels along a step: linear in time."""
+
+    def __init__(self, motion: StepSymbols, wheels: "SpunWheels") -> None:
+        stored = motion.state[7 : 7 + wheels.rate.numel()]
+        self._motion = motion
+        self._first, self._second = wheels.momentum(stored), motion.step * wheels.reaction
+        self.end = stored + motion.step * wheels.rate
+
+    def next(self, rates: Coefficients) -> ca.SX:
+        """Returns coefficient k of step times the acceleration by -w x S, (3,).
+
+        rates : coefficients 0 .. k of the angular velocity
+        """
+        turning = ca.cross(ca.vertcat(*rates[-1]), self._first)
+        if len(rates) > 1:
+            turning = turning + ca.cross(ca.vertcat(*rates[-2]), self._second)
+        motion = self._motion
+        return motion.step * motion.law.acceleration(motion.numbers, ca.SX.zeros(3), -turning)
 
 
 def _turn(turns: Coefficients, rates: Coefficients, step: ca.SX) -> list[ca.SX]:
@@ -175,6 +199,5 @@ PROPAGATOR = Propagator(
     c_files=("taylor", "taylor_series", "estimated_steps"),
     marker="D",
     suits=_suits,
-    wheels=NOT_FREE + "its series know no momentum but the body's own",
     safety=2.5,
 )
