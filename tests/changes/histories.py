@@ -37,9 +37,25 @@ def _vessel(rng: np.random.Generator) -> dict[str, Any]:
     return {"mass": float(10.0 ** rng.uniform(1.0, 3.0)), "pmi": pmi, "ports": {}, "points": points}
 
 
-def assembly(seed: int, count: int, moving: int = 4, others: int = 2, **rotation: Any) -> dict[str, Any]:
+def _wheels(rng: np.random.Generator, vessel: dict[str, Any]) -> dict[str, Any]:
+    """Returns wheels that are part of a vessel, also where little of its mass is left."""
+    most = vessel["mass"] * min(vessel["pmi"]) / 200.0
+    return {
+        f"w{i}": {
+            "axis": rng.normal(size=3).tolist(),
+            "inertia": float(rng.choice([0.0, most, 0.3 * most])),
+            "momentum": float(rng.normal() * vessel["mass"]),
+        }
+        for i in range(int(rng.integers(0, 3)))
+    }
+
+
+def assembly(
+    seed: int, count: int, moving: int = 4, others: int = 2, *, wheels: bool = False, **rotation: Any
+) -> dict[str, Any]:
     """Returns the raw scene of a random tree of vessels.
 
+    wheels : whether two vessels of three have a wheel or two, of which one in three has no inertia
     moving : how many ports have a pose that is an input, and a motion unless poses keep the rate
     others : how many vessels have a second place to dock
     Three docks in four can open, and of these one in four is open at the start.
@@ -72,6 +88,8 @@ def assembly(seed: int, count: int, moving: int = 4, others: int = 2, **rotation
         "force": [f"{vessel}.rcs" for vessel in list(vessels)[:3]],
         "vessel_torque": [f"V{count - 1}"],
     }
+    for i in range(count if wheels else 0):
+        vessels[f"V{i}"]["wheels"] = _wheels(rng, vessels[f"V{i}"])
     state = {"angular_velocity": (0.3 * rng.normal(size=3)).tolist(), "attitude": rng.normal(size=4).tolist()}
     return {
         "name": f"assembly{seed}",
@@ -253,6 +271,7 @@ class ByExchange:
 
     def __init__(self, raw: Mapping[str, Any], fmi: int = 3) -> None:
         self.instance, self.time = Instance(raw, fmi, exchange=True), 0.0
+        self.count = 7 + len(scene(raw).wheels)
         assert self.instance.initialise() == OK, self.instance.log
         assert self.instance.run() == OK, self.instance.log
 
@@ -264,22 +283,25 @@ class ByExchange:
 
     @property
     def states(self) -> Array:
-        """Attitude and angular velocity, or momentum, (7,)."""
-        array = (c_double * 7)()
-        self.instance.fmu.getContinuousStates(array, 7)
+        """Attitude and angular velocity, or momentum, and momenta of wheels, (7 + n,)."""
+        array = (c_double * self.count)()
+        self.instance.fmu.getContinuousStates(array, self.count)
         return np.array(array)
 
     @states.setter
     def states(self, values: Array) -> None:
-        assert self.instance._status(self.instance.fmu.setContinuousStates, (c_double * 7)(*values), 7) == OK
+        fmu, array = self.instance.fmu, (c_double * self.count)(*values)
+        assert self.instance._status(fmu.setContinuousStates, array, self.count) == OK
 
     def rates(self, time: float, states: Array, inputs: Values | None = None) -> Array:
-        """Returns the rates of the states, (7,), in continuous-time mode with these inputs."""
-        fmu, array = self.instance.fmu, (c_double * 7)()
+        """Returns the rates of the states in continuous-time mode with these inputs."""
+        fmu, array = self.instance.fmu, (c_double * self.count)()
         fmu.setTime(time)
         self.states = states
         assert self.instance.set(inputs or {}) == OK, self.instance.log
-        (fmu.getContinuousStateDerivatives if self.instance.fmi == 3 else fmu.getDerivatives)(array, 7)
+        (fmu.getContinuousStateDerivatives if self.instance.fmi == 3 else fmu.getDerivatives)(
+            array, self.count
+        )
         return np.array(array)
 
     def fly(self, duration: float, inputs: Callable[[float], Values] = lambda _: {}) -> None:
@@ -334,7 +356,7 @@ class ByTwin:
 
     @property
     def angular_velocity(self) -> Array:
-        return self.x[4:]
+        return self.x[4:7]
 
     @property
     def attitude(self) -> Array:
@@ -352,7 +374,9 @@ def flight(
     flown: Scene, attitude: Array, angular_velocity: Array, values: Values, duration: float
 ) -> tuple[Array, Array]:
     """Returns the state after a flight, (7,), and the impulse of the torque, (3,) [N m s], inertial axes."""
-    J, h = reference.composite(flown, values).inertia, reference.internal_momentum(flown, values)
+    locked, stored = stored_in_wheels(flown, values)
+    J = reference.composite(flown, values).inertia - locked
+    h = reference.internal_momentum(flown, values) + stored
     torque, law = reference.external_torque(flown, values), flown.rotation.law
 
     def rate(_: float, y: Array) -> Array:
@@ -364,6 +388,20 @@ def flight(
     start = np.concatenate([attitude, angular_velocity, np.zeros(3)])
     end = solve_ivp(rate, (0.0, duration), start, "DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
     return end[:7], end[7:]
+
+
+def stored_in_wheels(flown: Scene, values: Mapping[str, float]) -> tuple[Array, Array]:
+    """Returns A = sum I b b^T, (3, 3) [kg m2], of the wheels of what is joined to the root, and what they add
+    to the momentum h of what moves, (3,) [N m s]: h_w b less I b (b . k) that their vessel's rate k does not
+    turn along. Body axes.
+    """
+    locked, stored = np.zeros((3, 3)), np.zeros(3)
+    for name, motion in reference.motions(flown, values).items():
+        for wheel in flown.vessels[name].wheels.values():
+            b = motion.rotation @ (np.array(wheel.axis) / np.linalg.norm(wheel.axis))
+            locked += wheel.inertia * np.outer(b, b)
+            stored += (wheel.momentum - wheel.inertia * (b @ motion.rate)) * b
+    return locked, stored
 
 
 # The books
@@ -411,8 +449,13 @@ def parts(flown: Scene, angular_velocity: Array, values: Mapping[str, float]) ->
         R, r = motion.rotation.astype(Long), motion.origin.astype(Long)
         turning = omega + motion.rate
         momentum = R @ (mass * pmi * (R.T @ turning))
+        size = length(momentum)
+        for wheel in vessel.wheels.values():  # which no change of inputs speeds up or slows down
+            b = R @ (np.array(wheel.axis, Long) / length(np.array(wheel.axis, Long)))
+            own = (Long(wheel.momentum) - Long(wheel.inertia) * (b @ turning)) * b
+            momentum, size = momentum + own, size + length(own)
         velocity = motion.velocity + np.cross(omega, r)
-        found[name] = Part(mass, r, velocity, momentum, length(momentum))
+        found[name] = Part(mass, r, velocity, momentum, size)
     return found
 
 
@@ -457,7 +500,10 @@ def books(flown: Scene, before: Values, after: Values, old: Array, new: Array) -
     kept = held.momentum + flow
     arriving = [name for name in reference.poses(flown, after) if name not in reference.poses(flown, moved)]
     if arriving:
-        rate = reference.angular_velocity(flown, kept.astype(float), moved)
+        locked, stored = stored_in_wheels(flown, moved)
+        J = reference.composite(flown, moved).inertia - locked
+        inner = reference.internal_momentum(flown, moved) + stored
+        rate = np.linalg.solve(J, kept.astype(float) - inner)
         meeting = parts(flown, rate, touching(flown, before, after))
         base = whole(part for name, part in meeting.items() if name not in arriving)
         others = [meeting[name] for name in arriving]

@@ -15,14 +15,16 @@ from changes.histories import (
     ByReference,
     ByTwin,
     Driver,
+    Values,
     assembly,
     books,
     flight,
     happening,
     start_values,
+    stored_in_wheels,
 )
-from supervessel import reference
-from support import U, scene
+from supervessel import Scene, reference
+from support import Array, U, scene
 from support.marks import FMI
 
 BOOKS = 64 * U
@@ -34,6 +36,13 @@ HISTORIES = st.lists(
     max_size=20,
 )
 KEPT = [("rate", "momentum"), ("momentum", "momentum")]
+
+
+def momentum_of(flown: Scene, omega: Array, values: Values) -> Array:
+    """Returns the angular momentum, that of wheels included, (3,) [N m s], body axes."""
+    locked, stored = stored_in_wheels(flown, values)
+    momentum: Array = reference.angular_momentum(flown, omega, values) - locked @ omega + stored
+    return momentum
 
 
 def follow(raw: dict[str, Any], driver: Driver, history: list[tuple[list[str], int]]) -> None:
@@ -52,8 +61,7 @@ def follow(raw: dict[str, Any], driver: Driver, history: list[tuple[list[str], i
         driver.fly(0.5)
         end, impulse = flight(flown, attitude, new, values, 0.5)
         momenta = [
-            reference.rotation_matrix(q / np.linalg.norm(q))
-            @ reference.angular_momentum(flown, omega, values)
+            reference.rotation_matrix(q / np.linalg.norm(q)) @ momentum_of(flown, omega, values)
             for q, omega in ((attitude, new), (driver.attitude, driver.angular_velocity))
         ]
         scale = size + np.abs(impulse).max()
@@ -89,6 +97,19 @@ def test_both_interfaces_of_the_fmu_balance_momentum_over_random_histories(kept,
     flying = driver(raw, fmi)
     follow(raw, flying, history)
     flying.instance.free()
+
+
+@pytest.mark.parametrize("driver", [ByFmu, ByExchange, ByTwin])
+@pytest.mark.parametrize("kept", KEPT, ids=" ".join)
+@settings(deadline=None, derandomize=True, max_examples=5, phases=(Phase.explicit, Phase.generate))
+@given(history=HISTORIES)
+def test_the_books_hold_the_momentum_of_wheels_over_random_histories(kept, driver, history):
+    raw = assembly(7, 3, wheels=True, mass_change=kept[0], pose_change=kept[1])
+    assert all(vessel["wheels"] for vessel in raw["vessels"].values())
+    flying = driver(raw)
+    follow(raw, flying, history)
+    if not isinstance(flying, ByTwin):
+        flying.instance.free()
 
 
 @pytest.mark.parametrize("count", [3, 20])
