@@ -30,12 +30,14 @@ from supervessel.reference.rotation import (
     angular_velocity,
     external_torque,
     gradient_torque,
+    inner_momentum,
     momentum_ode,
     net_force,
     ode,
+    turning_tensor,
     vessel_outputs,
 )
-from supervessel.reference.wheels import Wheels
+from supervessel.reference.wheels import Wheels, wheel_outputs, wheels_of
 
 __all__ = [
     "Composite",
@@ -53,6 +55,7 @@ __all__ = [
     "external_torque",
     "gradient_torque",
     "gravity_torque",
+    "inner_momentum",
     "internal_momentum",
     "joined",
     "law_tensor",
@@ -67,5 +70,8 @@ __all__ = [
     "quaternion",
     "rotation_matrix",
     "sample_points",
+    "turning_tensor",
     "vessel_outputs",
+    "wheel_outputs",
+    "wheels_of",
 ]

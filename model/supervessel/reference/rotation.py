@@ -17,6 +17,7 @@ from supervessel.reference.assembly import (
 from supervessel.reference.attitude import attitude_dot, quaternion, rotation_matrix
 from supervessel.reference.gravity import gravity_torque
 from supervessel.reference.laws import angular_acceleration, law_tensor
+from supervessel.reference.wheels import Wheels, wheels_of
 from supervessel.scene.outputs import VESSEL_OUTPUTS
 from supervessel.scene.schema import ORIGIN, Scene
 
@@ -78,10 +79,10 @@ def ode(
     torque: ArrayLike | None = None,
     values: Mapping[str, float] | None = None,
 ) -> Array:
-    """Returns the rate of the state (attitude, angular velocity), (7,), of a scene under its own law.
+    """Returns the rate of a scene's state (attitude, angular velocity, momenta of wheels), (7 + n,).
 
     torque : (3,) [N m], all that acts from outside, about the barycentre; by default what `values` say and
-             gravity's gradient
+             gravity's gradient. The motors of wheels are within.
     Inputs are steady: between changes.
 
     Example:
@@ -89,49 +90,74 @@ def ode(
         [0.0, 0.0, 0.001, 0.0]
     """
     state = np.asarray(state, dtype=float)
+    attitude, omega, own = state[:4], state[4:7], wheels_of(scene, state[7:], values)
+    if torque is None:
+        torque = external_torque(scene, values) + gradient_torque(scene, attitude, values)
     acceleration = angular_acceleration(
         scene.rotation.law,
-        composite(scene, values).inertia,
-        state[4:],
-        external_torque(scene, values) + gradient_torque(scene, state[:4], values)
-        if torque is None
-        else torque,
-        internal_momentum(scene, values),
+        composite(scene, values).inertia - own.inertia,
+        omega,
+        np.asarray(torque, dtype=float) + own.reaction,
+        inner_momentum(scene, own, values),
     )
-    return np.concatenate([attitude_dot(state[:4], state[4:]), acceleration])
+    return np.concatenate([attitude_dot(attitude, omega), acceleration, own.torques])
 
 
-def angular_momentum(
-    scene: Scene, angular_velocity: ArrayLike, values: Mapping[str, float] | None = None
-) -> Array:
-    """Returns H = J omega + h, (3,) [N m s], about the barycentre, body axes, J being the law's tensor.
+def inner_momentum(scene: Scene, own: Wheels, values: Mapping[str, float] | None = None) -> Array:
+    """Returns the momentum of parts that move and of wheels, h + sum h_w b, (3,) [N m s], body axes.
 
-    angular_velocity : (3,) [rad/s], body axes
+    own : the scene's wheels; h is that of `internal_momentum` less what locked wheels would have
+
+    Example:
+        >>> reference.inner_momentum(scene, reference.wheels_of(scene, [])).tolist()
+        [0.0, 0.0, 0.0]
+    """
+    return internal_momentum(scene, values) - own.carried + own.momentum
+
+
+def turning_tensor(scene: Scene, values: Mapping[str, float] | None = None) -> Array:
+    """Returns the law's part of J - A, (3, 3) [kg m2], A being the inertia of wheels about their axes.
+
+    Example:
+        >>> bool(np.all(reference.turning_tensor(scene) == reference.composite(scene).inertia))
+        True
+    """
+    own = wheels_of(scene, np.zeros(len(scene.wheels)), values)
+    return law_tensor(scene.rotation.law, composite(scene, values).inertia - own.inertia)
+
+
+def angular_momentum(scene: Scene, rates: ArrayLike, values: Mapping[str, float] | None = None) -> Array:
+    """Returns H = (J - A) omega + h + sum h_w b, (3,) [N m s], about the barycentre, body axes, by the law.
+
+    rates : angular velocity [rad/s], body axes, and momenta of wheels [N m s], (3 + n,)
 
     Example:
         >>> round(float(reference.angular_momentum(scene, [0, 0.0011, 0])[1]) / 1e3)  # kN m s
         360
     """
-    J = law_tensor(scene.rotation.law, composite(scene, values).inertia)
-    momentum: Array = J @ np.asarray(angular_velocity, dtype=float) + internal_momentum(scene, values)
+    rates = np.asarray(rates, dtype=float)
+    inner = inner_momentum(scene, wheels_of(scene, rates[3:], values), values)
+    momentum: Array = turning_tensor(scene, values) @ rates[:3] + inner
     return momentum
 
 
-def angular_velocity(scene: Scene, momentum: ArrayLike, values: Mapping[str, float] | None = None) -> Array:
-    """Returns omega = J^-1 (H - h), (3,) [rad/s], body axes, of a momentum H, (3,) [N m s], body axes.
+def angular_velocity(scene: Scene, momenta: ArrayLike, values: Mapping[str, float] | None = None) -> Array:
+    """Returns omega, (3,) [rad/s], body axes, that the momentum H makes: the inverse of `angular_momentum`.
+
+    momenta : H, body axes, and momenta of wheels, (3 + n,) [N m s]
 
     Example:
         >>> momentum = reference.angular_momentum(scene, [0, 0.0011, 0])
         >>> round(float(reference.angular_velocity(scene, momentum)[1]), 9)
         0.0011
     """
-    J = law_tensor(scene.rotation.law, composite(scene, values).inertia)
-    excess: Array = np.asarray(momentum, dtype=float) - internal_momentum(scene, values)
-    return np.asarray(np.linalg.solve(J, excess), dtype=float)
+    momenta = np.asarray(momenta, dtype=float)
+    inner = inner_momentum(scene, wheels_of(scene, momenta[3:], values), values)
+    return np.asarray(np.linalg.solve(turning_tensor(scene, values), momenta[:3] - inner), dtype=float)
 
 
 def momentum_ode(scene: Scene, state: ArrayLike, values: Mapping[str, float] | None = None) -> Array:
-    """Returns the rate of the state (attitude, angular momentum in body axes), (7,), under the scene's law.
+    """Returns the rate of a scene's state (attitude, H in body axes, momenta of wheels), (7 + n,).
 
     H' = M - omega x H; without the gyroscopic term under "decoupled". Right however the inputs move.
 
@@ -144,8 +170,9 @@ def momentum_ode(scene: Scene, state: ArrayLike, values: Mapping[str, float] | N
     omega = angular_velocity(scene, state[4:], values)
     momentum_dot = external_torque(scene, values) + gradient_torque(scene, state[:4], values)
     if scene.rotation.law != "decoupled":
-        momentum_dot = momentum_dot - np.cross(omega, state[4:])
-    return np.concatenate([attitude_dot(state[:4], omega), momentum_dot])
+        momentum_dot = momentum_dot - np.cross(omega, state[4:7])
+    motors = wheels_of(scene, state[7:], values).torques
+    return np.concatenate([attitude_dot(state[:4], omega), momentum_dot, motors])
 
 
 def vessel_outputs(
@@ -153,7 +180,7 @@ def vessel_outputs(
 ) -> dict[str, Array]:
     """Returns the outputs of each vessel, "vessel.output"; all zero for one that is not joined to the root.
 
-    state : (attitude, angular velocity), (7,)
+    state : (attitude, angular velocity, momenta of wheels), (7 + n,)
 
     Example:
         >>> outputs = reference.vessel_outputs(scene, [1, 0, 0, 0, 0, 0.0011, 0])
@@ -161,7 +188,8 @@ def vessel_outputs(
         [0.09, -26.55, 3.14]
     """
     state = np.asarray(state, dtype=float)
-    omega, R_inertial_body = state[4:], rotation_matrix(state[:4])
+    omega, R_inertial_body = state[4:7], rotation_matrix(state[:4])
+    own_wheels = wheels_of(scene, state[7:], values)
     found, own = motions(scene, values), points(scene, values)
     whole = joined(own.values())
     drift = whole.masses @ whole.velocities / whole.masses.sum()
@@ -173,11 +201,23 @@ def vessel_outputs(
         motion, part = found[vessel], own[vessel]
         rho = part.positions - whole.barycentre
         v = np.cross(omega, rho) + part.velocities - drift
+        momentum = part.masses @ np.cross(rho, v) + _stored_beside(scene, vessel, own_wheels, omega)
         outputs |= {
             f"{vessel}.origin": motion.origin - whole.barycentre,
             f"{vessel}.centre_of_mass": motion.carry(np.array(table.centre_of_mass))[0] - whole.barycentre,
             f"{vessel}.attitude": quaternion(motion.rotation),
             f"{vessel}.angular_velocity": motion.rotation.T @ (omega + motion.rate),
-            f"{vessel}.angular_momentum": R_inertial_body @ (part.masses @ np.cross(rho, v)),
+            f"{vessel}.angular_momentum": R_inertial_body @ momentum,
         }
     return outputs
+
+
+def _stored_beside(scene: Scene, vessel: str, own: Wheels, omega: Array) -> Array:
+    """Returns what a vessel's wheels have of momentum beside locked ones, (3,) [N m s], body axes.
+
+    omega : (3,) [rad/s], of the body, body axes
+    """
+    of_vessel = np.array([name.partition(".")[0] == vessel for name in scene.wheels], dtype=bool)
+    locked = own.inertias * (own.axes @ omega + own.rates)
+    beside: Array = (of_vessel * (own.momenta - locked)) @ own.axes
+    return beside
