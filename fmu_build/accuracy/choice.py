@@ -31,6 +31,14 @@ NOT_COVERED = (
     "that spins a body up with each round",
 )
 
+ANOTHER_ORBIT = "another orbit than that of [experiment.orbit]"
+
+
+def not_covered(scene: Scene) -> tuple[str, ...]:
+    """Returns what the claim about a scene does not cover."""
+    return (*NOT_COVERED, ANOTHER_ORBIT) if scene.inputs.gravity else NOT_COVERED
+
+
 ABOUT = {
     "asked, attitude, rate": "largest errors of the attitude [rad], of the rate [rad/s]; horizon, step: s",
     "grade": "what the claim rests on: name; bounds of law and method and of the law alone, attitude [rad], "
@@ -119,7 +127,7 @@ def _chosen(scene: Scene, accuracy: Accuracy, progress: Progress) -> dict[str, A
             "why": grade.why,
             "narrow": grade.narrow,
         },
-        "not_covered": list(NOT_COVERED),
+        "not_covered": list(not_covered(scene)),
         "margin": MARGIN,
         "choice": _settings(best.choice),
         "attitude": _brief(best.attitude),
@@ -182,7 +190,7 @@ def _is_evidence(kept: Any, scene: Scene, asked: Mapping[str, Any]) -> bool:
     claim = f"{CLAIM} {GRADES[grade['name']]}"
     return (
         (kept["about"], kept["scene"], kept["claim"]) == (ABOUT, scene.name, claim)
-        and (kept["not_covered"], kept["margin"]) == (list(NOT_COVERED), MARGIN)
+        and (kept["not_covered"], kept["margin"]) == (list(not_covered(scene)), MARGIN)
         and kept["asked"] == asked
         and [(one["enough"], one["refused"]) for one in chosen] == [(True, None)]
         and are_numbers(numbers)

@@ -90,6 +90,15 @@ def series_operations(order: int, *, gyroscopic: bool, turned: bool) -> int:
     return products + alone * (order - 1) + 15 * order + rest + (TURNS if turned else 0)
 
 
+def gradient_operations(order: int, *, mixed_alone: bool, turned: bool) -> int:
+    """Returns what fmu_build/c/gradient_series.h adds to that (counted in tests/accuracy/test_cost.py).
+
+    mixed_alone : whether the acceleration follows from three products, not from six
+    """
+    alone = 106 if mixed_alone else 139
+    return 28 * order * order + alone * order + 170 + (TURNS if turned else 0)
+
+
 @interrupt_afterwards()
 def costs(model: Equations, law: Law, tolerance: float) -> Costs:
     """Returns the operations of a scene's library, flown at a tolerance."""
@@ -105,7 +114,11 @@ def costs(model: Equations, law: Law, tolerance: float) -> Costs:
     if control == "series":
         begun += count["by_torque"] + POWER
         turned, gyroscopic = model.product_count > 3, LAWS[law].gyroscopic_term
-        sub_step = POWER + series_operations(taylor_order(tolerance), gyroscopic=gyroscopic, turned=turned)
+        order = taylor_order(tolerance)
+        sub_step = POWER + series_operations(order, gyroscopic=gyroscopic, turned=turned)
+        if model.has_field:
+            place = model.slices.axes["gradient"]
+            sub_step += gradient_operations(order, mixed_alone=place.stop - place.start == 3, turned=turned)
     if model.plan.free == "between kicks":
         sub_step, begun = sub_step + count["step"] + free.once, 0
     return Costs(sub_step, begun, changed, free)

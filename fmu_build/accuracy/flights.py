@@ -33,15 +33,16 @@ def followed(scene: Scene, shop: Workshop, every: Histories, choice: Choice) -> 
 def body_of(scene: Scene, model: Equations) -> Body:
     """Returns the function that tells of a row of inputs how the body answers what acts."""
     numbers, docks = names_of(scene)
-    acting = len(model.names.u)
+    acting, here = len(model.resolved.acting), [v.start for v in model.resolved.field]
 
     def body(row: Array, booleans: Array) -> tuple[Array, Array]:
         values = dict(zip((*numbers, *docks), (*row, *booleans), strict=True))
         c = model.composite([values[name] for name in model.names.p])
         xx, yy, zz, xy, xz, yz = np.array(c).ravel()[model.slices.composite["inertia"]]
         at_rest = [1.0, *6 * [0.0]]
-        gains = [np.array(model.ode(at_rest, unit, c)).ravel()[4:] for unit in np.eye(acting)]
-        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), np.array(gains).T
+        rates = [np.array(model.ode(at_rest, [*u, *here], c)).ravel()[4:] for u in np.eye(acting + 1, acting)]
+        gains = np.array(rates[:-1]).reshape(acting, 3) - rates[-1]  # without what acts where nothing does
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), gains.T
 
     return body
 
@@ -95,8 +96,11 @@ def _ended(choice: Choice, ended: tuple[list[dict[str, Any]], bytes] | str | Non
 
 
 def names_of(scene: Scene) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Returns the names of inputs that are numbers, and of those of docks, in the order of columns."""
-    variables = resolve(scene).inputs
+    """Returns the names of inputs that are numbers, and of those of docks, in the order of columns.
+
+    Without those of gravity, which follow from the orbit.
+    """
+    variables = [variable for variable in resolve(scene).inputs if variable.part != "field"]
     return tuple(v.name for v in variables if not v.boolean), tuple(v.name for v in variables if v.boolean)
 
 

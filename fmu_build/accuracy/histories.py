@@ -129,7 +129,9 @@ class _Columns:
 
 
 def _columns(scene: Scene) -> _Columns:
-    variables = sorted(resolve(scene).inputs, key=lambda variable: variable.boolean)  # numbers come first
+    """Returns the inputs that have ranges: all but those of gravity, which follow from the orbit."""
+    ranged = [variable for variable in resolve(scene).inputs if variable.part != "field"]
+    variables = sorted(ranged, key=lambda variable: variable.boolean)  # numbers come first
     bounds = [(0.0, 1.0) if v.boolean else (v.low, v.high) for v in variables]
     low, high = np.array(bounds, dtype=float).reshape(-1, 2).T
     return _Columns(
@@ -144,10 +146,10 @@ def _columns(scene: Scene) -> _Columns:
 
 
 def course_up_to(scene: Scene, accuracy: Accuracy) -> Course:
-    """Returns the steps of a flight up to the horizon; with the inputs of the experiment, if there is one."""
-    moved = scene.experiment.inputs if scene.experiment else {}
-    experiment = Experiment(duration=accuracy.horizon, step=accuracy.step, inputs=moved)
-    course = course_of(scene.model_copy(update={"experiment": experiment}))
+    """Returns the steps of a flight up to the horizon, with orbit and inputs of the experiment, if any."""
+    given = scene.experiment or Experiment(duration=accuracy.horizon, step=accuracy.step)
+    lasting = given.model_copy(update={"duration": accuracy.horizon, "step": accuracy.step})
+    course = course_of(scene.model_copy(update={"experiment": lasting}))
     count = min(course.steps, MOST_SAMPLES)
     sampled = np.unique(np.rint(np.linspace(1, course.steps, count)).astype(np.int64))
     return replace(course, sampled=sampled)

@@ -135,6 +135,8 @@ def _changes(resolved: ResolvedScene, ranges: Bounds) -> Mapping[Kept, list[Chan
 
 def _refusal(resolved: ResolvedScene, ranges: Bounds) -> str:
     """Returns why ranges are not looked at; "" where they are."""
+    if resolved.field:
+        return "growth: gravity's gradient along an orbit is not bounded over ranges"
     for v in resolved.inputs:
         if not v.boolean and (v.low is None or v.high is None) and ranges[v.name] != (v.start, v.start):
             return f"growth: {v.name} has no range"

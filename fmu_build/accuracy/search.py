@@ -206,7 +206,7 @@ class Search:
 
     def _free(self, model: Model) -> None:
         """Tries what follows free motion, as far as it suits the scene."""
-        acts = any(low or high for low, high in self._acting_ranges())
+        acts = self.scene.inputs.gravity or any(low or high for low, high in self._acting_ranges())
         moves = bool(self.scene.inputs.motion)
         names = [] if acts or moves else always_free()
         names += while_free(self.scene, model) + (kicked(self.scene, model) if acts else [])

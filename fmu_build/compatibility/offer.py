@@ -72,14 +72,15 @@ def offer(
     """Returns the files of a scene by their places: VERSION/INTERFACE/PLATFORM/NAME/...
 
     progress : told what is being done
-    Raises BuildError for a body that turns too fast for a reference result, or where FMPy finds fault.
+    Raises BuildError for a body without a reference result (`reference_flight`), or where FMPy finds fault.
     """
     known = choose(scene)[0] if scene.accuracy else scene
     model = equations(known)
     entries = variable_table(model, naming)
     flight = reference_flight(model)
     if flight is None:
-        raise BuildError(f"{scene.name}: turns too fast for a reference result")
+        other = ", or does not orbit" if scene.gravity else ""
+        raise BuildError(f"{scene.name}: turns too fast for a reference result{other}")
     references = _references(model, entries, flight)
     files: dict[str, bytes] = {}
     with temporary_folder() as folder:

@@ -3,7 +3,8 @@
 Fifty communication steps from the scene's start. Masses lose up to a tenth within their range, unless that
 would change the rate; the torque grows to what would double the rate at the start, or give 0.01 rad/s; one
 dock with an input switches after a third of the time, and back after two thirds, with a rate at contact of a
-tenth of the body's; everything else stays.
+tenth of the body's; in a field of gravity the body goes on about the centre, its inputs having a row for each
+communication point; everything else stays.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from supervessel.composite.docks import switchable
 from supervessel.equations import Equations, composite_slices, p_start
+from supervessel.orbit import gravity_inputs, orbit_problem, two_body
 from supervessel.rotation.changes import followed
 from supervessel.scene.inputs import CONTACT_RATE, MASS, TORQUE, part_of
 from supervessel.scene.schema import Dock, Scene
@@ -89,9 +91,14 @@ class ReferenceFlight:
 def reference_flight(model: Equations) -> ReferenceFlight | None:
     """Returns the flight. The steps are the scene's, or a tenth of them and so on where the body turns fast.
 
-    None for a body that turns too fast for ATTEMPTS of these.
+    None for a body that turns too fast for ATTEMPTS of these; in a field of gravity also under the propagator
+    exact, which does not know it, and where the start is that of no orbit.
     """
     scene = model.resolved.scene
+    if scene.gravity is not None:
+        in_orbit = not orbit_problem(*scene.gravity_start, scene.gravity.mu)
+        if not in_orbit or (model.has_field and model.plan.free == "always"):
+            return None
     step = scene.experiment.step if scene.experiment else DEFAULT_STEP
     dock = _dock_that_switches(model)
     change = _change(model) if dock else None
@@ -173,7 +180,8 @@ def _stimuli(model: Equations, step: float, dock: Dock | None) -> Stimuli | None
     if not np.all(np.isfinite(last)):
         return None
     if dock is None:
-        return Stimuli(step, np.array([0.0, duration]), np.vstack([first, last]))
+        whole = Stimuli(step, np.array([0.0, duration]), np.vstack([first, last]))
+        return _along_orbit(resolved.scene, whole)
     owned = [variable.owner == dock.name for variable in inputs]
     switched = np.array([v.boolean and own for v, own in zip(inputs, owned, strict=True)])
     jumping = np.array([v.part == "contact" or v.boolean for v in inputs])
@@ -184,11 +192,27 @@ def _stimuli(model: Equations, step: float, dock: Dock | None) -> Stimuli | None
     there = np.where(switched, 1.0 - first, moving)
     back = np.where(switched, first, moving)
     one, other = (number * step for number in SWITCHES)
-    return Stimuli(
+    whole = Stimuli(
         step,
         np.array([0.0, one, one, other, other, duration]),
         np.vstack([first, values[0], there[0], there[1], back[1], back[2]]),
     )
+    return _along_orbit(resolved.scene, whole)
+
+
+def _along_orbit(scene: Scene, stimuli: Stimuli) -> Stimuli:
+    """Returns stimuli with a row for each communication point, where gravity's inputs follow the orbit."""
+    if not scene.inputs.gravity:
+        return stimuli
+    jumps = stimuli.instants[1:][np.diff(stimuli.instants) == 0.0]
+    instants = np.sort(np.concatenate([stimuli.times, jumps]))
+    before = np.append(np.diff(instants) == 0.0, False)
+    rows = np.array(
+        [stimuli.at(time, before=old) for time, old in zip(instants.tolist(), before.tolist(), strict=True)]
+    )
+    motion = np.column_stack(list(gravity_inputs(scene, instants).values()))
+    rows[:, len(rows[0]) - motion.shape[1] :] = motion  # they are the last inputs
+    return Stimuli(stimuli.step, instants, rows)
 
 
 def _last_inputs(model: Equations, inputs: Sequence[InputVariable], first: Array, duration: float) -> Array:
@@ -291,7 +315,7 @@ def _composite(model: Equations, inputs: Array) -> Array:
 
 
 def _action(model: Equations, inputs: Array) -> Array:
-    """Returns those of all inputs that act; they are the last ones."""
+    """Returns those of all inputs that torques follow from; they are the last ones."""
     return inputs[len(inputs) - len(model.names.u) :]
 
 
@@ -322,7 +346,8 @@ def _fly(model: Equations, stimuli: Stimuli, change: ca.Function | None) -> Arra
 
 def _stepped(model: Equations, x: Array, held: Array, step: float, most: int) -> tuple[Array, int] | None:
     """Returns the state x after a communication step [s], and in how many sub-steps; None beyond `most`."""
-    c, u, angle = _composite(model, held), _action(model, held), model.resolved.scene.rotation.max_angle_step
+    scene, c, u = model.resolved.scene, _composite(model, held), _action(model, held)
+    angle, field = scene.rotation.max_angle_step, len(u) - len(model.resolved.field)
     remaining, taken = step, 0
     while remaining > 0.0:
         square = float(model.steps.fastest_square(x, u, c))
@@ -331,11 +356,25 @@ def _stepped(model: Equations, x: Array, held: Array, step: float, most: int) ->
         if not taken + count <= most:
             return None
         if model.plan.free == "between kicks":
-            return _integrated(model, lambda _: held, x, (0.0, step)), taken
+            return _integrated(model, _moving(scene, held), x, (0.0, step)), taken
         size = remaining / max(1, ceil(count))
-        x = np.array(model.steps.step.call([x, u, c, size])[0]).ravel()
+        found = [np.array(result).ravel() for result in model.steps.step.call([x, u, c, size])]
+        x = found[0]
+        if model.has_field:
+            u = np.concatenate([u[:field], found[2]])
         remaining = remaining - size if count > 1.0 else 0.0
     return x, taken
+
+
+def _moving(scene: Scene, held: Array) -> Callable[[float], Array]:
+    """Returns the function time [s] -> inputs that are held from time 0 on, but for gravity's.
+
+    Where the body is in its field follows from them, as within a step of the FMU.
+    """
+    if scene.gravity is None:
+        return lambda _: held
+    mu, start = scene.gravity.mu, held[-6:]
+    return lambda time: np.append(held[:-6], two_body(start[:3], start[3:], mu, [time]))
 
 
 def _outputs(model: Equations, x: Array, inputs: Array) -> Array:

@@ -47,7 +47,8 @@ def reference_result(model: Equations, entries: Sequence[TableEntry]) -> dict[st
     """Returns the files of the reference result by their paths in the archive, see `reference_flight`.
 
     entries : the variable table
-    Nothing for a body that turns too fast. Outputs that tell of a step's error are not in the result.
+    Nothing for a body that turns too fast or has no motion in its field of gravity. Outputs that tell of a
+    step's error are not in the result.
     """
     flight = reference_flight(model)
     if flight is None:

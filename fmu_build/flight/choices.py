@@ -27,15 +27,25 @@ SHOWN = ("attitude", "angular_velocity")
 FROZEN: dict[Change, str] = {"mass": "mass", "pose": "pose"}
 """What can be left at its start, by the kind of change that it is then not, and its name in a trade."""
 
+NO_GRADIENT = "gravity"
+"""What `Model.frozen` has for a model without gravity's gradient."""
+
 
 @dataclass(frozen=True)
 class Model:
-    """What is taken into account: a law, and the kind of inputs, "mass", "pose" or "", left at the start."""
+    """What is taken into account.
+
+    law    : the rotation law
+    frozen : "mass" or "pose", the kind of inputs that are left at the start; "gravity", whose gradient is
+             left out; "", nothing
+    """
 
     law: Law
     frozen: str = ""
 
     def __str__(self) -> str:
+        if self.frozen == NO_GRADIENT:
+            return f"{self.law}, no gradient"
         return self.law + (f", {self.frozen} frozen" if self.frozen else "")
 
 
@@ -77,8 +87,11 @@ def models(scene: Scene, *, quick: bool) -> list[Model]:
     laws = laws_of(scene)
     if quick:
         laws = [law for law in laws if law in ("principal", "tensor")]
-    moved = [kind for kind in FROZEN if moved_inputs(scene, kind)]
-    return [Model(law, frozen) for law in laws for frozen in (*(moved if law != "none" else ()), "")]
+    left = [
+        *([NO_GRADIENT] if scene.inputs.gravity else []),
+        *(kind for kind in FROZEN if moved_inputs(scene, kind)),
+    ]
+    return [Model(law, frozen) for law in laws for frozen in (*(left if law != "none" else ()), "")]
 
 
 def moved_inputs(scene: Scene, change: Change) -> list[str]:
@@ -108,10 +121,15 @@ def is_free(scene: Scene, model: Model) -> bool:
     moved = [
         known[name].change
         for name, rows in experiment_of(scene).inputs.items()
-        if len({value for _, value in rows}) > 1
+        if known[name].part != "field" and len({value for _, value in rows}) > 1
     ]
     frozen = all(change != "" and change == model.frozen for change in moved)
-    return frozen and not acts(scene) and not scene.inputs.motion and not scene.wheels
+    return frozen and not is_pushed(scene, model) and not scene.inputs.motion and not scene.wheels
+
+
+def is_pushed(scene: Scene, model: Model) -> bool:
+    """Whether a torque acts at some time under a model: one of the inputs', or gravity's."""
+    return acts(scene) or (scene.inputs.gravity and model.frozen != NO_GRADIENT)
 
 
 def ways_to(scene: Scene, model: Model) -> list[Choice]:
@@ -127,14 +145,14 @@ def ways_to(scene: Scene, model: Model) -> list[Choice]:
 def by_tolerance(scene: Scene, model: Model, *, quick: bool) -> Iterator[Choice]:
     """Yields what is tried of a model besides rk4."""
     tolerances = QUICK_TOLERANCES if quick else TOLERANCES
-    torque = acts(scene)
+    torque = is_pushed(scene, model)
     for name in (
         *stepped(scene, model),
         *while_free(scene, model),
         *(kicked(scene, model) if torque else ()),
     ):
         yield from (Choice(model, name, None, tolerance) for tolerance in tolerances)
-    if not torque and not scene.inputs.motion:
+    if not torque and not scene.inputs.motion and not scene.wheels:
         yield from (Choice(model, name) for name in always_free())
 
 
@@ -188,11 +206,24 @@ def variant_of(scene: Scene, choice: Choice) -> Scene:
     if choice.model.law == "none":
         rotation = keeping_rate(rotation)
     raw["rotation"] = rotation
+    if choice.model.frozen == NO_GRADIENT:
+        _leave_out_gravity(raw)
     names = list(raw["outputs"]["names"])
     raw["outputs"] = {"names": [*names, *(name for name in SHOWN if name not in names)]}
-    if choice.model.frozen:
+    if choice.model.frozen in FROZEN:
         _freeze(raw, choice.model.frozen, at_start(scene))
     return parse_scene(raw, scene.name)
+
+
+def _leave_out_gravity(raw: dict[str, Any]) -> None:
+    """Takes gravity and what moves the body in its field out of a raw scene."""
+    inputs, experiment = raw["inputs"], raw["experiment"]
+    names = {name for name, kind in by_name(inputs).items() if kind.part == "field"}
+    names |= {kind.group(owner) for kind, owner in listed(inputs) if kind.part == "field"}
+    del raw["gravity"]
+    inputs |= {"gravity": False, "range": {n: b for n, b in inputs["range"].items() if n not in names}}
+    experiment.pop("orbit", None)
+    experiment["inputs"] = {n: rows for n, rows in experiment["inputs"].items() if n not in names}
 
 
 def _freeze(raw: dict[str, Any], change: str, start: Mapping[str, float]) -> None:

@@ -7,6 +7,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
+from supervessel.orbit import gravity_inputs
 from supervessel.problems import TradeError
 from supervessel.scene.inputs import by_name
 from supervessel.scene.schema import MOST_STEPS, Experiment, Scene
@@ -33,6 +34,8 @@ class Course:
     steps     : number of communication steps, n
     numbers   : by the name of a moving input, its values over each step, (n,), in the input's unit
     booleans  : by the name of a moving dock input, its values over each step, (n,), 0 and 1
+    field     : by the name of an input of gravity, where the orbit has the body as each step begins, (n,) [m,
+                m/s]; empty without an orbit
     sampled   : numbers of steps after which the state is recorded, ascending, n last
     """
 
@@ -42,6 +45,7 @@ class Course:
     steps: int
     numbers: dict[str, Array]
     booleans: dict[str, Array]
+    field: dict[str, Array]
     sampled: NDArray[np.int64]
 
     @property
@@ -68,7 +72,11 @@ def experiment_of(scene: Scene) -> Experiment:
 
 
 def course_of(scene: Scene) -> Course:
-    """Returns the scene's experiment step by step. Raises TradeError if there is none, or too many steps."""
+    """Returns the scene's experiment step by step.
+
+    Raises TradeError if there is none, if it has too many steps, or if it does not tell where the body is in
+    a field of gravity.
+    """
     experiment = experiment_of(scene)
     count = experiment.duration / experiment.step
     if not count <= MOST_STEPS:
@@ -95,8 +103,30 @@ def course_of(scene: Scene) -> Course:
         steps,
         {name: values(rows, times, slack) for name, rows in moving.items()},
         {name: held(rows, times, slack) for name, rows in switched.items()},
+        _field(scene, times),
         np.array(sorted(sampled - {0})),
     )
+
+
+def _field(scene: Scene, times: Array) -> dict[str, Array]:
+    """Returns the inputs of gravity at times [s] by the experiment's orbit; none where it has none.
+
+    Raises TradeError where it has none and its inputs do not say either where the body is.
+    """
+    experiment, known = experiment_of(scene), by_name(dict(scene.inputs))
+    if experiment.orbit is None:
+        told = experiment.inputs
+        missing = [name for name, kind in known.items() if kind.part == "field" and name not in told]
+        if missing:
+            raise TradeError(
+                f'experiment.orbit: missing, and experiment.inputs has no "{missing[0]}": nothing tells '
+                "where the body is in the field of gravity"
+            )
+        return {}
+    try:
+        return gravity_inputs(scene, times)
+    except ValueError as error:
+        raise TradeError(f"experiment.orbit: {error}") from None
 
 
 def held(rows: Iterable[tuple[float, float]], times: Array, slack: float = 0.0) -> Array:
@@ -135,7 +165,7 @@ def rows_at_start(rows: Iterable[tuple[float, float]]) -> float:
 
 
 def acts(scene: Scene) -> bool:
-    """Whether a torque or force other than 0 acts at some time."""
+    """Whether a torque or force other than 0 acts at some time; gravity's gradient is none of these."""
     known = by_name(dict(scene.inputs))
     return any(
         value != 0.0

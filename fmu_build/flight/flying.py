@@ -135,7 +135,7 @@ class InputCourses:
 
 
 def job_of(choice: Choice, course: Course, seconds: float) -> dict[str, Any]:
-    """Returns the part of host.py's job that describes an experiment.
+    """Returns the part of `run_host`'s job that describes an experiment.
 
     seconds : time that timing may take [s]; 0: no timing
     """
@@ -146,6 +146,7 @@ def job_of(choice: Choice, course: Course, seconds: float) -> dict[str, Any]:
         "steps": course.steps,
         "sampled": course.sampled.tolist(),
         "seconds": seconds,
+        "field": course.field,
     }
 
 
@@ -159,20 +160,24 @@ def run_host(
     """Returns the results of a job of host.py, run in a process of its own, and its samples as bytes.
 
     folder  : of the workshop
-    job     : from `job_of`
+    job     : from `job_of`; without "field" the inputs of gravity keep the values of the start
     names   : of the inputs that move: those that are numbers, and docks
     courses : of each flight, the paths that `InputCourses.written` returns
     Returns None if the process does not end within TIME_LIMIT, a text if it breaks down.
     """
     shown = [f"{name}[{i}]" for name, n in zip(SHOWN, (4, 3), strict=True) for i in range(1, n + 1)]
     with tempfile.TemporaryDirectory(dir=folder, prefix="job-") as place:
-        file, samples = Path(place, "job.json"), Path(place, "samples")
+        file, samples, fields = (Path(place, name) for name in ("job.json", "samples", "field"))
+        field = {name: v for name, v in job.get("field", {}).items() if name in built.references}
+        fields.write_bytes(np.column_stack([*field.values()]).tobytes() if field else b"\0")
         whole = {
             "judge": False,
             **job,
             "host": str(host_library(folder)),
             "library": str(built.library),
             "token": built.token,
+            "field": str(fields),
+            "field_references": [built.references[name] for name in field],
             "number_references": [built.references[name] for name in names[0]],
             "boolean_references": [built.references[name] for name in names[1]],
             "shown": [built.references[name] for name in shown],

@@ -41,6 +41,9 @@ typedef struct {
     long long steps;
     long long number_count, boolean_count; /* of inputs that move */
     const fmi3ValueReference *number_references, *boolean_references, *shown;
+    long long field_count; /* of inputs that say where the body is in a field of gravity */
+    const fmi3ValueReference *field_references;
+    const double *field; /* steps x field_count: set before every step */
     long long row_count;
     const long long *rows;       /* numbers of the steps before which inputs are set, ascending, from 0 */
     const double *numbers;       /* row_count x number_count */
@@ -149,13 +152,18 @@ static bool set_inputs(const Functions *fmu, fmi3Instance f, const Flight *fligh
     return status == fmi3OK;
 }
 
+static bool set_field(const Functions *fmu, fmi3Instance f, const Flight *flight, long long step) {
+    const size_t n = (size_t)flight->field_count;
+    return !n || fmu->set_numbers(f, flight->field_references, n, flight->field + (size_t)step * n, n) == fmi3OK;
+}
+
 /* Returns an instance at the start with a row's inputs, NULL if there is none. */
 static fmi3Instance begin(const Functions *fmu, const Flight *flight, Report *report, bool watched, long long row) {
     fmi3Instance f = fmu->instantiate("trade", flight->token, NULL, false, watched, false, false, NULL, 0, report,
                                       note, watched ? count_sub_step : NULL);
     if (!f) return NULL;
     if (fmu->enter(f, flight->tolerance > 0.0, flight->tolerance, 0.0, false, 0.0) == fmi3OK &&
-        set_inputs(fmu, f, flight, row) && fmu->leave(f) == fmi3OK)
+        set_inputs(fmu, f, flight, row) && set_field(fmu, f, flight, 0) && fmu->leave(f) == fmi3OK)
         return f;
     fmu->release(f);
     return NULL;
@@ -175,6 +183,7 @@ static bool fly(const Functions *fmu, fmi3Instance f, const Flight *flight, Repo
             const double size = i + 1 < flight->steps ? flight->size : flight->last_size;
             report->failed_at = time;
             if (row < flight->row_count && flight->rows[row] == i && !set_inputs(fmu, f, flight, row++)) return false;
+            if (!set_field(fmu, f, flight, i)) return false;
             if (fmu->step(f, time, size, true, &event, &terminate, &early, &time) != fmi3OK) return false;
             if (fmu->get(f, flight->shown, SHOWN, shown, SHOWN) != fmi3OK) return false;
             if (samples && next < flight->sample_count && flight->sampled[next] == i + 1)

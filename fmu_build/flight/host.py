@@ -39,6 +39,9 @@ class Flight(ctypes.Structure):
         ("number_references", ctypes.c_void_p),
         ("boolean_references", ctypes.c_void_p),
         ("shown", ctypes.c_void_p),
+        ("field_count", ctypes.c_longlong),
+        ("field_references", ctypes.c_void_p),
+        ("field", ctypes.c_void_p),
         ("row_count", ctypes.c_longlong),
         ("rows", ctypes.c_void_p),
         ("numbers", ctypes.c_void_p),
@@ -73,8 +76,9 @@ def fly(job: dict[str, Any]) -> list[dict[str, Any]]:
     )
     references = [
         (ctypes.c_uint32 * len(job[key]))(*job[key])
-        for key in ("number_references", "boolean_references", "shown")
+        for key in ("number_references", "boolean_references", "shown", "field_references")
     ]
+    field = ctypes.create_string_buffer(Path(job["field"]).read_bytes())
     sampled = (ctypes.c_longlong * len(job["sampled"]))(*job["sampled"])
     samples = (ctypes.c_double * (SHOWN * len(sampled)))()
     found: list[dict[str, Any]] = []
@@ -91,7 +95,10 @@ def fly(job: dict[str, Any]) -> list[dict[str, Any]]:
                 job["last_size"],
                 job["steps"],
                 *(len(array) for array in references[:2]),
-                *(ctypes.addressof(array) for array in references),
+                *(ctypes.addressof(array) for array in references[:3]),
+                len(references[3]),
+                ctypes.addressof(references[3]),
+                ctypes.addressof(field),
                 course["row_count"],
                 *(ctypes.addressof(array) for array in kept),
                 len(sampled),

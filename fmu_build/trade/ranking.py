@@ -48,7 +48,11 @@ def counted(scene: Scene, course: Course) -> Callable[[Choice, Flown], float]:
 def _course_of_inputs(scene: Scene, model: Model, course: Course) -> Histories:
     """Returns what a model's inputs do over the experiment, as the one history of all."""
     known = by_name(dict(scene.inputs))
-    numbers = [name for name in course.numbers if not _is_frozen(known[name].change, model)]
+    numbers = [
+        name
+        for name in course.numbers
+        if known[name].part != "field" and not _is_frozen(known[name].change, model)
+    ]
     docks = tuple(course.booleans)
     inputs = InputCourses(
         np.arange(course.steps),

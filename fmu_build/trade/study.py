@@ -43,7 +43,7 @@ ABOUT = {
     "scene": "name of the scene",
     "machine": "system and processor on which times were taken",
     "versions": "of the packages that results depend on",
-    "experiment": "flown: duration [s], communication step [s], inputs as rows of time [s] and value",
+    "experiment": "flown: duration [s], communication step [s], orbit, inputs as rows of time [s] and value",
     "steps": "communication steps of the experiment",
     "horizons": "times [s] up to which errors in lists are the largest; single errors are over the whole",
     "doubt": "how far two ways to a model's motion are apart; first that of the best model. Smaller errors "
@@ -52,7 +52,8 @@ ABOUT = {
     "choices": "models with a propagator and its settings: errors and costs",
     "refused": "choices that could not be flown",
     "law": "[rotation] law",
-    "frozen": 'kind of inputs that keep their value at the start: "mass", "pose" or "", none',
+    "frozen": 'kind of inputs that keep their value at the start: "mass" or "pose"; "gravity", whose '
+    'gradient is left out; "", nothing',
     "same": "models with the same motion to the last bit",
     "attitude": "error [rad]: angle between the attitude and that of the law tensor with all inputs moving",
     "rate": "error [rad/s]: length of the difference of the angular velocities, likewise",
@@ -138,7 +139,7 @@ def study(scene: Scene, *, quick: bool = False, progress: Progress = lambda *_: 
         "scene": scene.name,
         "machine": f"{platform.system()} {platform.machine()}",
         "versions": {name: version(name) for name in ("supervessel", *BUILT_WITH)},
-        "experiment": experiment_of(scene).model_dump(mode="json"),
+        "experiment": experiment_of(scene).model_dump(mode="json", exclude_none=True),
         "steps": course.steps,
         "horizons": course.horizons,
         "doubt": _lists(best.doubt),

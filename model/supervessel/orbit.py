@@ -2,12 +2,17 @@
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supervessel.problems import quantity
+from supervessel.scene.inputs import by_name
 from supervessel.scene.numbers import EPSILON
+
+if TYPE_CHECKING:
+    from supervessel.scene.schema import Scene
 
 Array = NDArray[np.float64]
 
@@ -18,6 +23,24 @@ TERMS = 9
 
 MOST_ITERATIONS = 200
 """More than bisection alone needs to bring a bracket of doubles down to two neighbours, at two a bit."""
+
+
+def gravity_inputs(scene: "Scene", times: ArrayLike) -> dict[str, Array]:
+    """Returns, by name, the inputs of gravity at some times, (n,) each [m, m/s].
+
+    times : (n,) [s], 0 at the start
+    The barycentre moves by two-body motion from where the scene starts.
+    Empty for a scene without `inputs.gravity`. Raises ValueError as `two_body` does.
+
+    Example:
+        >>> gravity_inputs(scene, [0.0])  # of a scene without gravity
+        {}
+    """
+    names = [name for name, kind in by_name(dict(scene.inputs)).items() if kind.part == "field"]
+    if not names or scene.gravity is None:
+        return {}
+    motion = np.hstack(two_body(*scene.gravity_start, scene.gravity.mu, times))
+    return {name: np.ascontiguousarray(column) for name, column in zip(names, motion.T, strict=True)}
 
 
 def two_body(position: ArrayLike, velocity: ArrayLike, mu: float, times: ArrayLike) -> tuple[Array, Array]:

@@ -35,7 +35,16 @@ extern "C" __attribute__((visibility("default"))) long counted(int order) {
     const Counted x[7] = {1.0, 0.0, 0.0, 0.0, 0.1, 0.2, 0.3}, push[3] = {0.1, 0.2, 0.3};
     const Counted map[12] = {0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
     Counted next[7], rest[3] = {0.0, 0.0, 0.0};
+#if FIELD
+    const Counted field[6] = {1.0, 2.0, 3.0, 0.1, -0.2, 0.3}, gradient[18] = {0.1, -0.2, 0.3};
+    Counted moved[6];
+    series.field = field;
+    series.gradient = gradient;
+#endif
     taylor_series(x, push, map, 0.1, &series);
     taylor_sum(&series, x, map, 1.0, next, rest);
+#if FIELD
+    taylor_sum_field(&series, map, 1.0, next, moved);
+#endif
     return operations;
 }

@@ -11,6 +11,7 @@ import pytest
 from accuracy.confirm import flown
 from fmu_build import BuildError, build_fmu
 from fmu_build.__main__ import main
+from fmu_build.accuracy.flights import body_of
 from fmu_build.accuracy.histories import course_up_to, histories
 from fmu_build.flight.choices import BEST, Choice
 from fmu_build.flight.experiment import course_of
@@ -19,8 +20,10 @@ from fmu_build.flight.results import keep, read
 from fmu_build.flight.workshop import build_all, source_of, workshop
 from supervessel import AccuracyError, Twin, choose, parse_scene
 from supervessel.equations import equations
+from supervessel.orbit import two_body
 from supervessel.scene.schema import without_accuracy
 from support import ISS_DG, OK, Instance, variant
+from support.orbits import EARTH, ORBIT, orbiting
 from support.processes import kept_in
 
 ACCURACY = {"attitude": 1e-4, "horizon": 20.0, "step": 0.5}
@@ -233,6 +236,41 @@ def test_libraries_for_trials_fly_the_same_to_the_last_bit():
 def ball(numbers, docks):
     """A sphere of 1e8 kg m2 under three torques."""
     return 1e8 * np.eye(3), 1e-8 * np.eye(3)
+
+
+ORBITING = variant(
+    orbiting({}, base=SPIN),
+    {
+        "inputs": {"gravity": True, "mass": ["B"], "range": {"B.mass": [0.5, 1.0]}},
+        "rotation.angular_velocity": [0.0, 1e-3, 0.0],
+        "accuracy": {"attitude": 1e-6, "horizon": 600.0, "step": 60.0},
+    },
+)
+"""A body that turns with its orbit, roughly."""
+
+
+def test_histories_go_along_the_orbit_and_leave_it_alone():
+    scene = parse_scene(ORBITING)
+    model = equations(without_accuracy(scene))
+    every = histories(
+        scene, scene.accuracy, lambda inputs: np.ones(len(inputs.rows), bool), body_of(scene, model)
+    )
+    assert every.numbers == ("B.mass",)
+    times = every.course.size * np.arange(every.course.steps)
+    motion = np.hstack(two_body(ORBIT["position"], ORBIT["velocity"], EARTH, times))
+    assert np.array_equal(np.column_stack(list(every.course.field.values())), motion)
+
+
+def test_the_gradient_counts_in_what_is_chosen():
+    """By no law but the full one: nothing is proven about the gradient over ranges."""
+    chosen, evidence = choose(parse_scene(ORBITING))
+    assert chosen.rotation.law == "tensor"
+    assert evidence["grade"]["name"] == "flown"
+    assert "another orbit than that of [experiment.orbit]" in evidence["not_covered"]
+    assert {one["propagator"] for one in evidence["candidates"]} <= {"taylor", "dop853", "rk4"}
+    reasons = {one["law"]: one["refused"] for one in evidence["candidates"] if one["refused"]}
+    assert reasons.keys() == {"none", "decoupled", "principal"}
+    assert all("gravity's gradient along an orbit" in reason for reason in reasons.values())
 
 
 def test_histories_stay_in_their_ranges_and_reach_both_ends():

@@ -7,7 +7,13 @@ from pathlib import Path
 import casadi as ca
 import pytest
 
-from fmu_build.accuracy.cost import free_operations, free_spans, operations, series_operations
+from fmu_build.accuracy.cost import (
+    free_operations,
+    free_spans,
+    gradient_operations,
+    operations,
+    series_operations,
+)
 from fmu_build.compile.compiler import TRIAL_FLAGS, compile_library
 from fmu_build.generate.sources import LAYER
 from fmu_build.platforms import host_platform
@@ -24,23 +30,32 @@ FLAGS = (
 """Those of a library of C, so that the compiler has all that it links: it comes with no C++ library built."""
 
 
+@pytest.mark.parametrize("gradient", [0, 3, 6])
 @pytest.mark.parametrize(
     ("product_count", "gyroscopic", "turned"), [(0, False, False), (3, True, False), (9, True, True)]
 )
-def test_operations_of_a_series_are_those_of_its_loop_in_c(tmp_path, product_count, gyroscopic, turned):
+def test_operations_of_a_series_are_those_of_its_loop_in_c(
+    tmp_path, product_count, gyroscopic, turned, gradient
+):
     """taylor_series.c, run with numbers that count; both are quadratic in the order: five points prove it."""
-    for name in ("taylor_series.c", "taylor_series.h"):
+    for name in ("taylor_series.c", "taylor_series.h", "gradient_series.h"):
         shutil.copy(LAYER / name, tmp_path)
     shutil.copy(HERE / "counted.cpp", tmp_path)
+    field = (
+        f"#define FIELD 1\n#define GRADIENT_COUNT {gradient}\n#define GRAVITY_MU 1.5\n" if gradient else ""
+    )
     (tmp_path / "scene.h").write_text(
-        f"#define PRODUCT_COUNT {product_count}\n#define TAYLOR_MOST_ORDER {MOST_ORDER}\n"
+        f"#define PRODUCT_COUNT {product_count}\n#define TAYLOR_MOST_ORDER {MOST_ORDER}\n{field}"
     )
     platform = host_platform()
     library = tmp_path / f"counted{platform.suffix}"
     compile_library([tmp_path / "counted.cpp"], platform, library, FLAGS)
     counted = CDLL(str(library)).counted
     for order in (6, 8, 12, 16, 20):
-        assert counted(order) == series_operations(order, gyroscopic=gyroscopic, turned=turned), order
+        expected = series_operations(order, gyroscopic=gyroscopic, turned=turned)
+        if gradient:
+            expected += gradient_operations(order, mixed_alone=gradient == 3, turned=turned)
+        assert counted(order) == expected, order
 
 
 def test_slow_operations_count_as_several_and_moves_as_none():

@@ -16,12 +16,17 @@ import pytest
 from lxml import etree
 
 from fmu.descriptions import CHAIN
+from fmu_build.document.reference_flight import reference_flight
 from fmu_build.document.reference_result import manifest
 from supervessel import load_scene, parse_scene
+from supervessel.equations import equations
+from supervessel.orbit import two_body
 from supervessel.scene.writing import scene_text
 from support import ISS_DG, TURNING, Array, body, built, scene, variant
 from support.marks import FMI
+from support.orbits import EARTH, ORBIT, orbiting
 
+SLOW = TURNING | {"angular_velocity": [0.001, 0.002, -0.001]}
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.toml"))
 
@@ -58,12 +63,35 @@ SCENES: dict[str, dict[str, Any]] = {
     "split": {**body(propagator="split", tolerance=1e-11, **TURNING), "name": "split"},
     "exact": {**body(propagator="exact", **TURNING), "name": "exact"},
     "auto": {**body(propagator="auto", **TURNING), "name": "auto"},
+    "orbit and dock": orbiting(
+        {
+            "name": "orbit_dock",
+            "rotation.propagator": "rk4",
+            "experiment.duration": 1e3,
+            "experiment.step": 20.0,
+        },
+        base=BERTH,
+    ),
+    "orbit": orbiting(
+        {"name": "orbit", "experiment.duration": 3e3, "experiment.step": 60.0},
+        base=body(propagator="auto", **SLOW),
+    ),
+    "orbit, split": orbiting(
+        {"name": "orbit_split"}, base=body(propagator="split", tolerance=1e-11, **TURNING)
+    ),
     "error told": variant(body(**TURNING), {"name": "told", "outputs.names": ["error_estimate", "attitude"]}),
 }
 
 # RK4's steps are the same but for rounding; dop853 keeps 1e-9 a step, attitude in rad and rate relative; the
 # result of split is RK4's, in steps of 0.01 rad, the others' are of higher order than any of these.
-TOLERANCE = {"moving port": 1e-7, "split": 1e-8, "exact": 1e-10, "auto": 1e-10}
+TOLERANCE = {
+    "moving port": 1e-7,
+    "split": 1e-8,
+    "exact": 1e-10,
+    "auto": 1e-10,
+    "orbit": 1e-9,
+    "orbit, split": 1e-8,
+}
 ROUNDING = 1e-12
 
 
@@ -144,6 +172,23 @@ def test_one_dock_switches_and_switches_back_with_a_motion_at_contact(name):
 def test_a_scene_without_docks_has_two_rows_of_inputs(name):
     assert len(table(name, 3, "inputs")) == 2
     assert len(table(name, 3, "outputs")) == 51
+
+
+@pytest.mark.parametrize("name", ["orbit and dock", "orbit"])
+def test_in_an_orbit_there_is_a_row_of_inputs_for_each_communication_point(name):
+    moved, shown = table(name, 3, "inputs"), table(name, 3, "outputs")
+    assert sorted({*moved["time"].tolist()}) == shown["time"].tolist()
+    positions, velocities = two_body(ORBIT["position"], ORBIT["velocity"], EARTH, moved["time"])
+    for quantity, expected in (("position", positions), ("velocity", velocities)):
+        found = np.column_stack([moved[f"gravity.{quantity}[{i}]"] for i in (1, 2, 3)])
+        assert np.array_equal(found, expected)
+
+
+def test_what_cannot_fly_in_its_field_has_no_reference_result():
+    start = {"mu": EARTH, "position": ORBIT["position"], "velocity": [0.0, 0.0, 0.0]}
+    falling = orbiting({"gravity": start, "experiment": None}, base=body())
+    exact = orbiting({}, base=body(propagator="exact"))
+    assert [reference_flight(equations(parse_scene(raw))) for raw in (falling, exact)] == [None, None]
 
 
 def test_what_tells_of_a_steps_error_is_no_reference():

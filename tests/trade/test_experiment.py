@@ -1,4 +1,4 @@
-"""`[experiment.inputs]`: what is read, what is refused, and what holds over each step."""
+"""`[experiment.inputs]` and `[experiment.orbit]`: what is read and refused, and what holds over each step."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,9 @@ from fmu_build.flight.choices import Choice, Model, models, variant_of
 from fmu_build.flight.experiment import course_of, values
 from fmu_build.trade import TradeError
 from supervessel import SceneError, parse_scene
+from supervessel.orbit import two_body
 from support import ISS_DG, variant
+from support.orbits import EARTH, HEIGHT, ORBIT, orbiting
 
 RANGE = {"DG.mass": [11000.0, 24500.0]}
 
@@ -148,6 +150,47 @@ def test_what_is_frozen_keeps_its_value_at_the_start_and_is_no_input():
     still = variant_of(scene, Choice(Model("tensor", "pose"), "taylor"))
     assert still.port("DG.nose").position == (0.0, -0.5, -10.076)
     assert (still.inputs.mass, still.inputs.pose) == (("DG",), ())
+
+
+def test_an_orbit_moves_the_inputs_of_gravity_at_each_communication_point():
+    scene = parse_scene(orbiting({"experiment.duration": 3.2}))
+    course = course_of(scene)
+    assert course.steps == 4
+    found = np.column_stack(list(course.field.values()))
+    expected = np.hstack(two_body(ORBIT["position"], ORBIT["velocity"], EARTH, [0.0, 1.0, 2.0, 3.0]))
+    assert list(course.field) == [
+        f"gravity.{what}[{i}]" for what in ("position", "velocity") for i in (1, 2, 3)
+    ]
+    assert np.array_equal(found, expected)
+    assert course.numbers == {}
+
+
+def test_without_an_orbit_all_inputs_of_gravity_have_courses_of_their_own():
+    here = {"gravity": {"mu": EARTH, "position": [HEIGHT, 0.0, 0.0], "velocity": [0.0, 0.0, 0.0]}}
+    courses = {f"gravity.{what}[{i}]": [[0, 1e7]] for what in ("position", "velocity") for i in (1, 2, 3)}
+    told = orbiting({**here, "experiment": {"duration": 2.0, "step": 1.0, "inputs": courses}})
+    assert course_of(parse_scene(told)).numbers.keys() == courses.keys()
+    del courses["gravity.velocity[2]"]
+    silent = orbiting({**here, "experiment": {"duration": 2.0, "step": 1.0, "inputs": courses}})
+    words = (
+        r'experiment\.orbit: missing, and experiment\.inputs has no "gravity\.velocity\[2\]": nothing tells'
+    )
+    with pytest.raises(TradeError, match=words):
+        course_of(parse_scene(silent))
+
+
+def test_a_model_without_gradient_is_a_scene_without_gravity():
+    scene = parse_scene(orbiting({"inputs.range": {"gravity.position": [-7e6, 7e6]}}))
+    assert [str(m) for m in models(scene, quick=True)] == [
+        "principal, no gradient",
+        "principal",
+        "tensor, no gradient",
+        "tensor",
+    ]
+    left = variant_of(scene, Choice(Model("tensor", "gravity"), "taylor"))
+    assert (left.gravity, left.inputs.gravity, left.inputs.range) == (None, False, {})
+    assert (left.experiment.orbit, left.experiment.duration) == (None, 10.0)
+    assert variant_of(scene, Choice(Model("tensor"), "taylor")).gravity == scene.gravity
 
 
 def test_errors_are_given_at_communication_points():

@@ -27,7 +27,9 @@ def test_the_pages_table_is_that_of_the_shipped_figures(shipped):
 def test_the_shipped_figures_are_of_the_scene_as_it_is(shipped):
     scene = load_scene(ROOT / "examples" / "iss_dg.toml")
     assert scene.experiment is not None
-    assert shipped["experiment"] == scene.experiment.model_dump(mode="json") | {"duration": 6000.0}
+    assert shipped["experiment"] == scene.experiment.model_dump(mode="json", exclude_none=True) | {
+        "duration": 6000.0
+    }
     rk4 = [row for row in shipped["choices"] if row["propagator"] == "rk4"]
     assert all(len(row["settings"]) == 8 and row["sub_steps"] == 60000 for row in rk4)  # 1e-4 rad a step
     assert shipped["horizons"] == [60.0, 600.0, 6000.0]

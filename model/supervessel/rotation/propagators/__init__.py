@@ -69,7 +69,7 @@ def plan_of(scene: "Scene") -> Plan:
     if name != "auto":
         chosen = PROPAGATORS[name]
         return Plan(chosen if chosen.build else None, chosen.free)
-    if scene.wheels:
+    if scene.wheels or scene.inputs.gravity:
         return Plan(PROPAGATORS[stepping(scene)], "never")
     if not any(listed(dict(scene.inputs))):
         return Plan(None, "always")
