@@ -20,6 +20,7 @@ most by 8.3; a rate's turns the body by 6600 s of it, of which its step's estima
 SMALL = GROWTH * 6 * 1e-15
 """[rad] of six steps, whose errors are controlled to 1e-15 each."""
 LAWS = ("tensor", "principal", "decoupled")
+WHEEL = ("axis", "inertia", "momentum")
 
 
 def orbiting(propagator: str, law: str = "tensor", **rotation: Any) -> dict[str, Any]:
@@ -79,6 +80,24 @@ def test_the_motion_along_an_orbit_is_the_true_one(propagator, rotation, allowed
     x, estimate = flown(orbiting(propagator, law, **rotation), law, STEP)
     assert off(x, law, DURATION) < allowed
     assert off(x, law, DURATION) < GROWTH * estimate
+
+
+@pytest.mark.parametrize(
+    ("propagator", "rotation", "allowed"),
+    [("dop853", {}, SMALL), ("rk4", {"max_angle_step": 0.002}, 1e-9)],
+)
+@pytest.mark.parametrize("law", ["tensor", "principal"])
+def test_wheels_in_an_orbit_move_as_they_truly_do(propagator, rotation, allowed, law):
+    axes, inertias, momenta = [[0.0, 0.6, 0.8], [1.0, 0.0, 0.0]], [2e4, 0.0], [3e4, -2e4]
+    raw = orbiting(propagator, law, **rotation)
+    wheels = zip("ab", axes, inertias, momenta, strict=True)
+    raw["vessels"]["S"]["wheels"] = {name: dict(zip(WHEEL, row, strict=True)) for name, *row in wheels}
+    start = GyrostatState(ATTITUDE, RATE, ORBIT["position"], ORBIT["velocity"], momenta)
+    body = Gyrostat(TENSOR, law, mu=EARTH, axes=axes, inertias=inertias, motors=[0, 0])
+    true = np.array(Course(body, start, DURATION).at(DURATION).attitude, dtype=float)
+    x, _ = flown(raw, law, STEP)
+    assert 2.0 * min(np.linalg.norm(x[:4] - true), np.linalg.norm(x[:4] + true)) < allowed
+    assert off(x, law, DURATION) > 1e-3  # without wheels it would be elsewhere
 
 
 def test_split_is_of_order_two():

@@ -73,7 +73,12 @@ SCENES: dict[str, dict[str, Any]] = {
         base=BERTH,
     ),
     "orbit": orbiting(
-        {"name": "orbit", "experiment.duration": 3e3, "experiment.step": 60.0},
+        {
+            "name": "orbit",
+            "experiment.duration": 3e3,
+            "experiment.step": 60.0,
+            "vessels.B.wheels": {"yaw": {"axis": [0.0, 0.6, 0.8], "inertia": 2.0, "momentum": 3.0}},
+        },
         base=body(propagator="auto", **SLOW),
     ),
     "orbit, split": orbiting(

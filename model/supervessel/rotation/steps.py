@@ -130,7 +130,8 @@ def _fastest_square(
     """
     field, omega = motion.field, motion.state[4:7]
     by_torque = length(motion.acceleration_by_torque)
-    held = dynamics.held_square(motion.state, angle, length)
+    turning = motion.state if field is None else motion.state[: -field.start.numel()]
+    held = dynamics.held_square(turning, angle, length)
     if field is None:
         return fastest_square(omega, by_torque, motion.law.growth, angle, held)
     pushed = by_torque + field.largest_acceleration(motion.law, motion.numbers)
