@@ -1,12 +1,15 @@
 """Ten minutes of the ISS with a DeltaGlider docked: the ship burns fuel, its port is moved, torque acts.
 
-Run by `make run`, or with a folder as argument (default: build). Flies iss_dg.fmu in that folder with FMPy,
-once under the tensor law and once, in a second FMU built from the same scene, under the diagonal-only law.
+Run by `make run`, or with a folder as argument (default: build). Flies three FMUs of the same scene with
+FMPy: iss_dg_orbit.fmu, the station in its orbit, on which gravity's gradient acts;
+iss_dg_orbit_principal.fmu, which leaves the products of inertia out; and iss_dg.fmu, which has to be in that
+folder, without gravity.
 Writes iss_dg.csv (every output at every step), iss_dg_inertia.png, iss_dg_rotation.png and iss_dg.md there;
 prints the table.
 """
 
 import io
+import math
 import sys
 import tomllib
 from pathlib import Path
@@ -19,14 +22,34 @@ import numpy as np
 from fmpy import simulate_fmu
 
 from fmu_build import build_fmu
-from supervessel import parse_scene
+from supervessel import Scene, parse_scene
+from supervessel.orbit import two_body
 from supervessel.shell.files import write_files
 
 EXAMPLES = Path(__file__).parent
 DURATION, STEP = 600.0, 0.1  # s
+MU, RADIUS = 3.986004418e14, 6786137.0  # m3/s2, of the Earth; m, 408 km above its equator
+PLACE = (
+    (0.0, 0.0, RADIUS),
+    (math.sqrt(MU / RADIUS), 0.0, 0.0),
+)  # m, m/s: z up, the turn about y that of the orbit
 
 
-def flight_plan() -> np.ndarray:
+def in_orbit(raw: dict, law: str) -> Scene:
+    """Returns a scene on a circular orbit, under a rotation law.
+
+    raw : the tables of a scene file without gravity
+    """
+    position, velocity = PLACE
+    given = {
+        "inputs": raw["inputs"] | {"gravity": True},
+        "gravity": {"mu": MU, "position": position, "velocity": velocity},
+        "rotation": raw["rotation"] | {"law": law},
+    }
+    return parse_scene(raw | given, "iss_dg.toml in orbit")
+
+
+def flight_plan(*, with_gravity: bool) -> np.ndarray:
     """Returns the inputs over time as FMPy takes them: one column for each input that moves."""
     t = np.arange(0.0, DURATION + STEP / 2, STEP)
     burn = np.interp(t, [60.0, 360.0], [24500.0, 11600.0])  # kg
@@ -49,6 +72,9 @@ def flight_plan() -> np.ndarray:
         "torque[2]": zero,
         "torque[3]": pulse(t, 100.0, 120.0, 5000.0) + pulse(t, 500.0, 520.0, -9000.0),
     }
+    if with_gravity:
+        for name, path in zip(("position", "velocity"), two_body(*PLACE, MU, t), strict=True):
+            columns |= {f"gravity.{name}[{i}]": path[:, i - 1] for i in (1, 2, 3)}
     return np.rec.fromarrays(list(columns.values()), names=list(columns))
 
 
@@ -57,10 +83,10 @@ def pulse(t: np.ndarray, start: float, end: float, height: float) -> np.ndarray:
     return np.where((t >= start) & (t < end), height, 0.0)
 
 
-def fly(fmu: Path) -> np.ndarray:
+def fly(fmu: Path, plan: np.ndarray) -> np.ndarray:
     """Returns every output of the FMU at every communication step."""
     return simulate_fmu(
-        str(fmu), stop_time=DURATION, output_interval=STEP, input=flight_plan(), fmi_type="CoSimulation"
+        str(fmu), stop_time=DURATION, output_interval=STEP, input=plan, fmi_type="CoSimulation"
     )
 
 
@@ -89,22 +115,25 @@ def turned_apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.degrees(2.0 * np.arctan2(np.linalg.norm(cross, axis=1), scalar))
 
 
-def table(tensor_law: np.ndarray, apart: np.ndarray) -> str:
-    """Returns the results as a Markdown table."""
+def table(full: np.ndarray, apart: np.ndarray) -> str:
+    """Returns the results as a Markdown table.
+
+    full  : the flight in orbit under the law `tensor`
+    apart : (n, 2) [deg], how far the flights without products and without the gradient have turned away
+    """
     times = [0.0, 60.0, 360.0, 400.0, 460.0, 600.0]
-    J, mass, pmi = tensors(tensor_law), tensor_law["mass"], group(tensor_law, "pmi", 3)
+    J, mass, pmi = tensors(full), full["mass"], group(full, "pmi", 3)
     lines = [
         "| t [s] | mass [kg] | PMI x, y, z [m2] | principal moments / mass [m2] | axis tilt [deg] "
-        "| principal law off by [deg] |",
-        "|---:|---:|---:|---:|---:|---:|",
+        "| off without products [deg] | without gradient [deg] |",
+        "|---:|---:|---:|---:|---:|---:|---:|",
     ]
     for t in times:
-        k = int(np.argmin(np.abs(tensor_law["time"] - t)))
+        k = int(np.argmin(np.abs(full["time"] - t)))
         moments = np.linalg.eigvalsh(J[k]) / mass[k]
         three = [", ".join(f"{x:.3f}" for x in row) for row in (pmi[k], moments)]
-        lines.append(
-            f"| {t:.0f} | {mass[k]:.0f} | {three[0]} | {three[1]} | {axis_tilt(J[k]):.3f} | {apart[k]:.4f} |"
-        )
+        off = " | ".join(f"{angle:.4f}" for angle in apart[k])
+        lines.append(f"| {t:.0f} | {mass[k]:.0f} | {three[0]} | {three[1]} | {axis_tilt(J[k]):.3f} | {off} |")
     return "\n".join(lines)
 
 
@@ -127,45 +156,49 @@ def plot(panels: list[tuple[str, np.ndarray, list[str]]], t: np.ndarray) -> byte
 def main(folder: Path) -> None:
     """Flies both FMUs, writes the files into `folder`, prints the table."""
     raw = tomllib.loads((EXAMPLES / "iss_dg.toml").read_text())
-    raw["rotation"]["law"] = "principal"
-    diagonal = build_fmu(parse_scene(raw, "iss_dg.toml"), folder / "iss_dg_principal.fmu")
-    tensor_law, principal_law = fly(folder / "iss_dg.fmu"), fly(diagonal)
-    apart = turned_apart(group(tensor_law, "attitude", 4), group(principal_law, "attitude", 4))
+    orbit = build_fmu(in_orbit(raw, "tensor"), folder / "iss_dg_orbit.fmu")
+    diagonal = build_fmu(in_orbit(raw, "principal"), folder / "iss_dg_orbit_principal.fmu")
+    plan = flight_plan(with_gravity=True)
+    full, others = fly(orbit, plan), [fly(diagonal, plan)]
+    others.append(fly(folder / "iss_dg.fmu", flight_plan(with_gravity=False)))
+    attitudes = [group(flight, "attitude", 4) for flight in (full, *others)]
+    apart = np.column_stack([turned_apart(attitudes[0], other) for other in attitudes[1:]])
 
-    names = tensor_law.dtype.names
+    names = full.dtype.names
     rows = io.BytesIO()
     np.savetxt(
         rows,
-        np.column_stack([tensor_law[name] for name in names]),
+        np.column_stack([full[name] for name in names]),
         delimiter=",",
         header=",".join(f'"{name}"' for name in names),
         comments="",
         fmt="%.17g",
     )
-    t, xyz = tensor_law["time"], ["x", "y", "z"]
-    pmi = group(tensor_law, "pmi", 3)
+    t, xyz = full["time"], ["x", "y", "z"]
+    pmi = group(full, "pmi", 3)
     inertia = plot(
         [
             ("PMI, change [m2]", pmi - pmi[0], xyz),
-            ("barycentre [m]", group(tensor_law, "barycentre", 3), xyz),
-            ("mass [t]", tensor_law["mass"][:, None] / 1000.0, ["ISS + DG"]),
+            ("barycentre [m]", group(full, "barycentre", 3), xyz),
+            ("mass [t]", full["mass"][:, None] / 1000.0, ["ISS + DG"]),
         ],
         t,
     )
     rotation = plot(
         [
-            ("rate [deg/s]", np.degrees(group(tensor_law, "angular_velocity", 3)), xyz),
-            ("attitude", group(tensor_law, "attitude", 4), ["w", *xyz]),
-            ("law principal off [deg]", apart[:, None], ["against tensor"]),
+            ("rate [deg/s]", np.degrees(group(full, "angular_velocity", 3)), xyz),
+            ("attitude", group(full, "attitude", 4), ["w", *xyz]),
+            ("off [deg]", apart, ["without\nproducts", "without\ngradient"]),
         ],
         t,
     )
-    results = table(tensor_law, apart)
+    results = table(full, apart)
     report = (
         "# ISS with a DeltaGlider, ten minutes\n\n"
-        "Fuel burns from 60 to 360 s, the docking port of the ship is moved from 400 to 460 s, torque\n"
-        "pulses act about x (30-50, 200-220 s) and z (100-120, 500-520 s). Law `tensor`; the last column is\n"
-        "how far the law `principal`, which leaves the products of inertia out, has turned away from it.\n\n"
+        "On a circular orbit, 408 km up, z up. Fuel burns from 60 to 360 s, the docking port of the ship is\n"
+        "moved from 400 to 460 s, torque pulses act about x (30-50, 200-220 s) and z (100-120, 500-520 s).\n"
+        "Law `tensor`, with gravity's gradient; the last columns are how far the law `principal`, which\n"
+        "leaves the products of inertia out, and a flight without the gradient have turned away from it.\n\n"
         f"{results}\n\n"
         "![PMI, barycentre, mass](iss_dg_inertia.png)\n\n![rates, attitude, drift](iss_dg_rotation.png)\n\n"
         "Every output at every step: `iss_dg.csv`.\n"

@@ -5,6 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from importlib.metadata import version
 from pathlib import Path
 
@@ -16,6 +17,10 @@ from fmu_build import build_fmu
 from supervessel import SceneError, Twin, load_scene, parse_scene
 from support import ISS_DG, variant
 from support.pages import PAGES, ROOT, blocks, text
+
+sys.path.append(str(ROOT / "examples"))
+
+import iss_dg
 
 PYTHON_BLOCKS = [(page, number) for page in PAGES for number in range(len(blocks(page, "python")))]
 
@@ -52,6 +57,30 @@ def test_the_docked_iss_prints_the_pages_table(flown):
     table = re.search(r"^\| t \[s\].*?(?=\n\n)", text("examples/README.md"), re.DOTALL | re.MULTILINE)
     assert table is not None
     assert flown[1].strip() == table[0].strip()
+
+
+def test_other_pages_give_the_tables_last_figures(flown):
+    rows = [[cell.strip() for cell in line.split("|")] for line in flown[1].splitlines()]
+    by_time = {row[1]: row[-3:-1] for row in rows[2:]}
+    late = [f"{float(angle):.2f} deg" for angle in by_time["600"]]
+    assert f"off by {late[0]}; {late[1]} |" in text("README.md")
+    row = f"{float(by_time['60'][0]):.4f} deg after 60 s, {late[0]} after 600 s"
+    assert row in text("model/docs/equations.md")
+
+
+def test_the_pages_orbit_is_the_one_that_is_flown():
+    """Circular, its normal the body's y, about which the station turns."""
+    (lines,) = blocks("examples/README.md", "toml")
+    given, raw = tomllib.loads(lines), tomllib.loads((ROOT / "examples" / "iss_dg.toml").read_text())
+    scene = iss_dg.in_orbit(raw, "tensor")
+    assert scene.gravity.model_dump() == {
+        key: tuple(v) if isinstance(v, list) else v for key, v in given["gravity"].items()
+    }
+    assert scene.inputs.gravity == given["inputs"]["gravity"]
+    position, velocity = map(np.array, scene.gravity_start)
+    rate = np.cross(position, velocity) / (position @ position)
+    assert velocity @ velocity == pytest.approx(scene.gravity.mu / np.linalg.norm(position), rel=1e-15)
+    np.testing.assert_allclose(rate, scene.rotation.angular_velocity, rtol=0, atol=3e-5)
 
 
 @pytest.mark.skipif(version("matplotlib") != "3.11.2", reason="the plot is drawn by matplotlib 3.11.2")
