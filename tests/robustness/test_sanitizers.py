@@ -271,7 +271,9 @@ def test_the_fmu_test_suite_runs_clean_on_libraries_with_sanitizers(tmp_path):
         "UBSAN_OPTIONS": f"print_stacktrace=1:log_path={tmp_path / 'undefined'}",
     }
     command = [sys.executable, "-m", "pytest", "-q", "-n", "auto", "-p", "sanitized"]
-    command += ["-k", "not leave_no_memory_behind", str(here.parent / "fmu"), str(here.parent / "changes")]
+    # The fuzzer looks at memory; names that a debugger is told are in these binaries.
+    without = "not leave_no_memory_behind and not nothing_of_it_is_in_the_binary"
+    command += ["-k", without, *(str(here.parent / name) for name in ("fmu", "changes", "wheels"))]
     done = subprocess.run(
         command, env=environment, capture_output=True, text=True, timeout=SUITE_TIME_LIMIT, check=False
     )
