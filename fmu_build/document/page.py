@@ -80,7 +80,7 @@ def page(
         facts=_facts(scene, fmi),
         picture=picture,
         vessels=_vessels(parts),
-        ports=_ports(scene) + _points(scene),
+        ports=_ports(scene) + _points(scene) + _wheels(scene),
         composite=_composite(parts.whole),
         naming=NAMINGS_SAID[entries[0].naming],
         variables=_variables(entries),
@@ -178,6 +178,18 @@ def _points(scene: Scene) -> str:
     rows = [(name, scene.point(name).position) for name in scene.inputs.force]
     caption = "Points where forces act, in the axes of their vessels"
     return table(caption, ("point", "position [m]"), rows) if rows else ""
+
+
+def _wheels(scene: Scene) -> str:
+    """Returns the table of wheels; nothing where there are none."""
+    wheels = [(name, scene.wheel(name)) for name in scene.wheels]
+    rows: list[tuple[Cell, ...]] = [
+        (name, wheel.axis, wheel.inertia, wheel.momentum, "yes" if name in scene.inputs.wheel else "no")
+        for name, wheel in wheels
+    ]
+    head = ("wheel", "axis", "inertia [kg.m2]", "momentum at the start [N.m.s]", "motor")
+    caption = "Wheels, part of their vessels' mass and moments, in the axes of their vessels"
+    return table(caption, head, rows) if rows else ""
 
 
 def _composite(whole: Mapping[str, NDArray[np.float64]]) -> str:

@@ -1,5 +1,6 @@
 """FMUs of scenes with wheels: flown by FMPy as the twin flies, their states, derivatives, refusals."""
 
+import re
 from collections.abc import Sequence
 from functools import cache
 from typing import Any
@@ -9,7 +10,10 @@ import numpy as np
 import pytest
 
 from fmu.jacobians import columns, transposed_rows
+from fmu_build.document.documentation import documentation
+from fmu_build.interface.variable_table import variable_table
 from supervessel import Twin
+from supervessel.equations import equations
 from support import DISCARD, OK, Array, Instance, U, refusal, scene, store, variant
 from support.marks import FMI
 from wheels.scenes import CARRIER, GYROSTAT, MOTION, RATES
@@ -328,6 +332,14 @@ def test_the_model_description_has_the_wheels(fmi):
     assert len(instance.description.derivatives) == 10
     assert float(by_name["A.x.momentum"].nominal) == 20.0
     instance.free()
+
+
+def test_the_page_lists_wheels():
+    model = equations(scene(CARRIER))
+    page = documentation(model.resolved.scene, variable_table(model), 3)["documentation/index.html"].decode()
+    table = page[page.index("Wheels, part of") :].split("</table>")[0]
+    rows = [re.findall(r"<td[^>]*>(.*?)</td>", row) for row in table.split("</tr>")]
+    assert ["B.y", "0, 1, 1", "1", "3", "yes"] in rows
 
 
 def test_what_changes_with_a_motor_is_its_wheels_momentum_and_the_bodys_rate():

@@ -6,7 +6,8 @@ h_w : its angular momentum along the axis [N m s], relative to inertial space
 A   : sum of I_w b_w b_w^T over the wheels, (3, 3) [kg m2]
 
 J - A is the tensor of all that turns with the body: a wheel's momentum along its axis is h_w, whatever the
-body does. Root axes have the directions of body axes. Source: [EQ] Wheels, eqs. (14) and (15).
+body does. Root axes have the directions of body axes.
+Source: [EQ] Wheels, eqs. (16) and (17).
 """
 
 from collections.abc import Mapping, Sequence

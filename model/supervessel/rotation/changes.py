@@ -9,7 +9,7 @@ A change happens at one instant and takes the inputs p from their values before 
 
 All vectors and tensors are about the barycentre in body axes. S = h + sum of h_w b_w is the momentum of
 moving parts and wheels [N m s], J the tensor without what wheels have about their axes, J - A, [kg m2]: [EQ]
-When masses or poses change, eq. (11), and Wheels, eq. (16), the sources of the equations here. In stages 2
+When masses or poses change, eq. (11), and Wheels, eq. (18), the sources of the equations here. In stages 2
 and 3 J is the tensor of the law, `RotationLaw.keeping`; in stage 4 it is the full tensor under every law. No
 change changes the momentum h_w of a wheel.
 """

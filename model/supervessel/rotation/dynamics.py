@@ -118,7 +118,7 @@ class Dynamics:
         position : see `torque_at`
         The law is given the torque M - sum of u_w b_w - omega x (h + sum of h_w b_w), and the tensor J - A.
         Source: [EQ] Conventions, eq. (2); Rotation: the four laws, eqs. (7) to (10); When masses or poses
-        change, eq. (11); Wheels, eqs. (14) and (15).
+        change, eq. (11); Wheels, eqs. (16) and (17).
         """
         attitude, omega, held = state[:4], state[4:7], self.held_momentum(state)
         acting = self.torque_at(self.body_torque, attitude, position)
