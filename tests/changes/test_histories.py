@@ -41,7 +41,8 @@ KEPT = [("rate", "momentum"), ("momentum", "momentum")]
 def momentum_of(flown: Scene, omega: Array, values: Values) -> Array:
     """Returns the angular momentum, that of wheels included, (3,) [N m s], body axes."""
     locked, stored = stored_in_wheels(flown, values)
-    momentum: Array = reference.angular_momentum(flown, omega, values) - locked @ omega + stored
+    J, h = reference.composite(flown, values).inertia, reference.internal_momentum(flown, values)
+    momentum: Array = (J - locked) @ omega + h + stored
     return momentum
 
 

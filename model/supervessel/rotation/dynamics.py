@@ -103,12 +103,12 @@ class Dynamics:
     def held_momentum(self, state: ca.SX) -> ca.SX | None:
         """Returns h + sum of h_w b_w, (3,) [N m s], body axes, where the law has a gyroscopic term.
 
-        state : see `state_rate`; what stands behind that is not read
+        state : see `state_rate`; what a step carries besides may follow
         None where nothing moves relative to the body, or the law takes no notice.
         """
         if self.wheels is None or not self.law.gyroscopic_term:
             return self.spin
-        held = self.wheels.momentum(state[7 : 7 + self.wheels.rate.numel()])
+        held = self.wheels.momentum(state[7 : 7 + self.wheels.motors.numel()])
         return held if self.spin is None else self.spin + held
 
     def state_rate(self, state: ca.SX, position: ca.SX | None = None) -> ca.SX:
