@@ -14,7 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fmu_build.document.accuracy_text import accuracy_text
-from fmu_build.document.rotation_text import energy_and_momentum, law_equation, law_text, what_changes_keep
+from fmu_build.document.rotation_text import (
+    energy_and_momentum,
+    gradient_text,
+    law_equation,
+    law_text,
+    what_changes_keep,
+)
 from fmu_build.document.tables import Cell, number_text, rounded, table
 from fmu_build.interface.model_description import role_attributes
 from fmu_build.interface.names import Naming
@@ -38,6 +44,12 @@ NAMINGS_SAID: dict[Naming, str] = {
     "scene file and twin have for them.",
 }
 """What the page says of the names of variables."""
+
+NEAREST = (
+    "<li>the attracting centre must be farther from the barycentre than twice the assembly's size, the root "
+    "of the trace of its inertia tensor over its mass; its inputs must be at most 1e100 long.</li>\n"
+)
+"""What is refused of the place in a field of gravity, HTML."""
 
 ROLE_TITLES: dict[Role, tuple[str, str]] = {
     "time": ("Independent variable", ""),
@@ -86,6 +98,7 @@ def page(
         variables=_variables(entries),
         law=escape(rotation.law),
         law_equation=law_equation(scene),
+        gravity=gradient_text(scene),
         moments=energy_and_momentum(scene),
         changes=what_changes_keep(scene),
         law_text=law_text(scene),
@@ -93,6 +106,7 @@ def page(
         propagator_text=description(scene),
         accuracy="" if evidence is None else accuracy_text(evidence),
         definite="" if rotation.law == "none" else " and positive definite",
+        nearest=NEAREST if gradient_text(scene) else "",
         status=VERSIONS[fmi].refusal,
     )
 
@@ -121,6 +135,8 @@ def _facts(scene: Scene, fmi: int) -> str:
     ]
     if scene.convention == "orbiter":
         rows.append(("convention", "orbiter: of the composite's tensor only the diagonal is kept"))
+    if scene.gravity is not None:
+        rows.append(("attracting centre, mu [m3/s2]", scene.gravity.mu))
     if experiment is not None:
         rows += [("default duration [s]", experiment.duration), ("default step [s]", experiment.step)]
     return table("", (), rows)

@@ -27,6 +27,7 @@ LAWS: dict[Law, tuple[str, str]] = {
 """Equation and description of each rotation law, HTML."""
 
 H = "<i>h</i>"
+R_HAT = "r\N{COMBINING CIRCUMFLEX ACCENT}"
 RHO = "<i>\N{GREEK SMALL LETTER RHO}</i><sub>j</sub>"
 
 SPINNING_LAWS: dict[Law, str] = {
@@ -34,6 +35,20 @@ SPINNING_LAWS: dict[Law, str] = {
     "tensor": f"<i>J ω</i>{PRIME} = <i>M</i> {MINUS} <i>ω</i> {TIMES} (<i>J ω</i> + {H})",
 }
 """Equations of the laws that the momentum h of moving ports enters, HTML; in the others it does nothing."""
+
+MU, UNIT = "<i>\N{GREEK SMALL LETTER MU}</i>", f"<i>{R_HAT}</i>"
+
+GRADIENT = (
+    "<p>Gravity's gradient adds to <i>M</i>, of a centre that attracts as a mass point does,</p>\n"
+    f'<p class="equation">3 {MU}/|<i>r</i>|<sup>3</sup> {UNIT} {TIMES} <i>J</i> {UNIT}, &#160;\n'
+    f"{UNIT} = <i>R</i>(<i>q</i>)<sup>T</sup> <i>r</i>/|<i>r</i>|</p>\n"
+    "<p>with the input <code>gravity.position</code> for <i>r</i>. Within a communication step the body "
+    "moves about the centre from there, beginning with <code>gravity.velocity</code>: "
+    f"<i>r</i>{PRIME}{PRIME} = {MINUS}{MU} <i>r</i>/|<i>r</i>|<sup>3</sup>.</p>"
+)
+"""What the page says of gravity's gradient, HTML."""
+
+DIAGONAL = "\n<p><i>J</i> is the diagonal there too, as the law has it.</p>"
 
 KEPT_BY = {
     ("mass", "rate"): "When a mass or a moment changes, the <b>angular velocity is kept</b>: mass leaves or "
@@ -75,6 +90,13 @@ def law_equation(scene: Scene) -> str:
 def law_text(scene: Scene) -> str:
     """Returns what a scene's rotation law leaves out, and where it serves."""
     return LAWS[scene.rotation.law][1]
+
+
+def gradient_text(scene: Scene) -> str:
+    """Returns the equations of gravity's gradient and of the motion in a step, or "" without gravity."""
+    if scene.gravity is None or scene.rotation.law == "none":
+        return ""
+    return GRADIENT + (DIAGONAL if scene.rotation.law != "tensor" else "") + "\n"
 
 
 def energy_and_momentum(scene: Scene) -> str:

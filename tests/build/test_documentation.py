@@ -22,6 +22,7 @@ from supervessel.equations import equations
 from supervessel.scene.schema import PROPAGATOR_NAMES, Law
 from support import ISS_DG, body, variant
 from support.marks import FMI
+from support.orbits import orbiting
 
 VOID = {"meta", "br", "hr", "img", "link", "input"}
 SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
@@ -51,6 +52,7 @@ SCENES = {
     "single": body(),
     "nothing_in": variant(body(), {"inputs": {}, "outputs": {"names": ["mass"]}}),
     "hostile_names": HOSTILE_NAMES,
+    "orbit": orbiting({"rotation": {"law": "principal"}}),
     "docks": variant(
         ISS_DG,
         {
@@ -332,3 +334,13 @@ def test_a_missing_licence_text_is_named(monkeypatch):
     monkeypatch.setattr("fmu_build.document.licences.distribution", lambda package: Empty())
     with pytest.raises(BuildError, match="supervessel has no licence text"):
         licence_files(3)
+
+
+@pytest.mark.parametrize(("law", "told"), [("none", False), ("principal", True), ("tensor", True)])
+def test_the_page_tells_of_the_gradient_where_it_turns_the_body(law, told):
+    scene = parse_scene(orbiting({"rotation": {"law": law}}, base=body()))
+    html = documentation(scene, variable_table(equations(scene)), 3)[INDEX].decode()
+    assert ("Gravity's gradient adds to" in html) is told
+    assert ("farther from the barycentre than twice the assembly's size" in html) is told
+    assert ("is the diagonal there too" in html) is (law == "principal")
+    assert "3.986004418e+14" in html or "398600441800000" in html
