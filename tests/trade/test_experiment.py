@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fmu_build.flight.choices import Choice, Model, models, variant_of
+from fmu_build.flight.choices import Choice, Model, by_tolerance, models, variant_of, ways_to
 from fmu_build.flight.experiment import course_of, values
 from fmu_build.trade import TradeError
 from supervessel import SceneError, parse_scene
@@ -191,6 +191,20 @@ def test_a_model_without_gradient_is_a_scene_without_gravity():
     assert (left.gravity, left.inputs.gravity, left.inputs.range) == (None, False, {})
     assert (left.experiment.orbit, left.experiment.duration) == (None, 10.0)
     assert variant_of(scene, Choice(Model("tensor"), "taylor")).gravity == scene.gravity
+
+
+@pytest.mark.parametrize("gravity", [True, False])
+def test_every_way_of_a_body_with_wheels_is_a_scene(gravity):
+    """Wheels know no free motion, with the gradient or without."""
+    raw = orbiting({"vessels.ISS.wheels": {"yaw": {"axis": [0.0, 0.0, 1.0]}}, "inputs": {"gravity": True}})
+    if not gravity:
+        raw = variant(raw, {"inputs": {}, "gravity": None, "experiment.orbit": None})
+    scene = parse_scene(raw)
+    for model in models(scene, quick=True):
+        ways = [*by_tolerance(scene, model, quick=True), *ways_to(scene, model)]
+        assert {way.propagator for way in ways} == {"taylor", "dop853"}
+        for way in ways:
+            variant_of(scene, way)
 
 
 def test_errors_are_given_at_communication_points():
