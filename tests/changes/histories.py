@@ -1,6 +1,8 @@
 """Histories of an assembly: scenes of many vessels, what happens to them, who flies them, and the books."""
 
 import json
+import math
+import re
 from collections.abc import Callable, Iterable, Mapping
 from ctypes import c_double
 from dataclasses import dataclass
@@ -55,9 +57,9 @@ def assembly(
 ) -> dict[str, Any]:
     """Returns the raw scene of a random tree of vessels.
 
-    wheels : whether two vessels of three have a wheel or two, of which one in three has no inertia
     moving : how many ports have a pose that is an input, and a motion unless poses keep the rate
     others : how many vessels have a second place to dock
+    wheels : whether two vessels of three have a wheel or two, with motors; one in three has no inertia
     Three docks in four can open, and of these one in four is open at the start.
     """
     rng = np.random.default_rng(seed)
@@ -88,8 +90,10 @@ def assembly(
         "force": [f"{vessel}.rcs" for vessel in list(vessels)[:3]],
         "vessel_torque": [f"V{count - 1}"],
     }
-    for i in range(count if wheels else 0):
-        vessels[f"V{i}"]["wheels"] = _wheels(rng, vessels[f"V{i}"])
+    if wheels:
+        for vessel in vessels.values():
+            vessel["wheels"] = _wheels(rng, vessel)
+        inputs["wheel"] = [f"{name}.{wheel}" for name, each in vessels.items() for wheel in each["wheels"]]
     state = {"angular_velocity": (0.3 * rng.normal(size=3)).tolist(), "attitude": rng.normal(size=4).tolist()}
     return {
         "name": f"assembly{seed}",
@@ -161,6 +165,16 @@ def _undock(flown: Scene, values: Values, rng: np.random.Generator) -> Values:
     return {f"{rng.choice(closed)}.docked": 0.0} if closed else {}
 
 
+def _spin(flown: Scene, values: Values, rng: np.random.Generator) -> Values:
+    return {f"{name}.torque": 5.0 * rng.normal() for name in flown.wheels}
+
+
+def _at_rest(flown: Scene, values: Values) -> Values:
+    """Returns that the motors of wheels whose vessels are not joined to the root do nothing, as they must."""
+    there = reference.poses(flown, values)
+    return {f"{name}.torque": 0.0 for name in flown.wheels if name.partition(".")[0] not in there}
+
+
 def legal(flown: Scene, values: Mapping[str, float]) -> bool:
     try:
         reference.closed_docks(flown, values)
@@ -178,19 +192,26 @@ EVENTS: dict[str, Callable[[Scene, Values, np.random.Generator], Values]] = {
 }
 
 
+WHEEL_EVENTS = EVENTS | {"spin": _spin}
+"""With motors of wheels."""
+
+
 def happening(flown: Scene, values: Values, kinds: Iterable[str], seed: int) -> Values:
     """Returns the inputs that change when these things happen at one instant."""
     rng, changed = np.random.default_rng(seed), Values()
     for kind in kinds:
-        changed |= EVENTS[kind](flown, values | changed, rng)
-    return changed
+        changed |= WHEEL_EVENTS[kind](flown, values | changed, rng)
+    return changed | _at_rest(flown, values | changed)
 
 
 # Who flies
 
 
 class Driver(Protocol):
-    """Something that flies a scene: inputs go in, angular velocity and attitude come out."""
+    """Something that flies a scene: inputs go in, angular velocity and attitude come out.
+
+    rates : angular velocity and momenta of wheels, (3 + n,)
+    """
 
     def set(self, inputs: Values) -> None: ...
 
@@ -198,6 +219,9 @@ class Driver(Protocol):
 
     @property
     def angular_velocity(self) -> Array: ...
+
+    @property
+    def rates(self) -> Array: ...
 
     @property
     def attitude(self) -> Array: ...
@@ -210,19 +234,25 @@ class ByReference:
         self.scene = scene(raw)
         self.values: Values = start_values(self.scene)
         rotation = self.scene.rotation
-        self.attitude, self.angular_velocity = (
+        self.attitude, self.angular_velocity, self.momenta = (
             np.array(rotation.attitude),
             np.array(rotation.angular_velocity),
+            np.array([self.scene.wheel(name).momentum for name in self.scene.wheels]),
         )
+
+    @property
+    def rates(self) -> Array:
+        return np.concatenate([self.angular_velocity, self.momenta])
 
     def set(self, inputs: Values) -> None:
         after = self.values | inputs
-        self.angular_velocity = reference.change(self.scene, self.angular_velocity, self.values, after)
+        self.angular_velocity = reference.change(self.scene, self.rates, self.values, after)[:3]
         self.values = after
 
     def fly(self, duration: float) -> None:
-        end, _ = flight(self.scene, self.attitude, self.angular_velocity, self.values, duration)
-        self.attitude, self.angular_velocity = end[:4] / np.linalg.norm(end[:4]), end[4:]
+        end, _ = flight(self.scene, self.attitude, self.rates, self.values, duration)
+        self.attitude = end[:4] / np.linalg.norm(end[:4])
+        self.angular_velocity, self.momenta = end[4:7], end[7:]
 
 
 class ByFmu:
@@ -245,6 +275,20 @@ class ByFmu:
     @property
     def attitude(self) -> Array:
         return np.asarray(self.instance.get("attitude"))
+
+    @property
+    def rates(self) -> Array:
+        return rates_of(self.instance)
+
+
+def rates_of(instance: Instance) -> Array:
+    """Returns angular velocity and momenta of wheels, (3 + n,)."""
+    stored = [instance.get(name) for name in instance.references if STORED.fullmatch(name)]
+    return np.array([*instance.get("angular_velocity"), *stored])
+
+
+STORED = re.compile(r"state\.\w+\.\w+\.momentum")
+"""Names of the momenta of wheels."""
 
 
 class ByEvents(ByFmu):
@@ -271,9 +315,9 @@ class ByExchange:
 
     def __init__(self, raw: Mapping[str, Any], fmi: int = 3) -> None:
         self.instance, self.time = Instance(raw, fmi, exchange=True), 0.0
-        self.count = 7 + len(scene(raw).wheels)
         assert self.instance.initialise() == OK, self.instance.log
         assert self.instance.run() == OK, self.instance.log
+        self.size = 7 + sum(bool(STORED.fullmatch(name)) for name in self.instance.references)
 
     def set(self, inputs: Values) -> None:
         fmu = self.instance.fmu
@@ -283,25 +327,24 @@ class ByExchange:
 
     @property
     def states(self) -> Array:
-        """Attitude and angular velocity, or momentum, and momenta of wheels, (7 + n,)."""
-        array = (c_double * self.count)()
-        self.instance.fmu.getContinuousStates(array, self.count)
+        """Attitude, angular velocity or momentum, and momenta of wheels, (7 + n,)."""
+        array = (c_double * self.size)()
+        self.instance.fmu.getContinuousStates(array, self.size)
         return np.array(array)
 
     @states.setter
     def states(self, values: Array) -> None:
-        fmu, array = self.instance.fmu, (c_double * self.count)(*values)
-        assert self.instance._status(fmu.setContinuousStates, array, self.count) == OK
+        array = (c_double * self.size)(*values)
+        assert self.instance._status(self.instance.fmu.setContinuousStates, array, self.size) == OK
 
-    def rates(self, time: float, states: Array, inputs: Values | None = None) -> Array:
-        """Returns the rates of the states in continuous-time mode with these inputs."""
-        fmu, array = self.instance.fmu, (c_double * self.count)()
+    def states_dot(self, time: float, states: Array, inputs: Values | None = None) -> Array:
+        """Returns the rates of the states, (7 + n,), in continuous-time mode with these inputs."""
+        fmu, array = self.instance.fmu, (c_double * self.size)()
         fmu.setTime(time)
         self.states = states
         assert self.instance.set(inputs or {}) == OK, self.instance.log
-        (fmu.getContinuousStateDerivatives if self.instance.fmi == 3 else fmu.getDerivatives)(
-            array, self.count
-        )
+        derivatives = fmu.getContinuousStateDerivatives if self.instance.fmi == 3 else fmu.getDerivatives
+        derivatives(array, self.size)
         return np.array(array)
 
     def fly(self, duration: float, inputs: Callable[[float], Values] = lambda _: {}) -> None:
@@ -309,14 +352,14 @@ class ByExchange:
         end = self.time + duration
         largest = np.abs(self.states).max()
         done = solve_ivp(
-            lambda t, y: self.rates(t, y, inputs(t)),
+            lambda t, y: self.states_dot(t, y, inputs(t)),
             (self.time, end),
             self.states,
             "DOP853",
             rtol=1e-13,
             atol=1e-15 * largest,
         )
-        self.rates(end, done.y[:, -1], inputs(end))
+        self.states_dot(end, done.y[:, -1], inputs(end))
         self.time = end
 
     @property
@@ -326,6 +369,10 @@ class ByExchange:
     @property
     def attitude(self) -> Array:
         return np.asarray(self.instance.get("attitude"))
+
+    @property
+    def rates(self) -> Array:
+        return rates_of(self.instance)
 
 
 @cache
@@ -351,57 +398,56 @@ class ByTwin:
         self.p = p_next
 
     def fly(self, duration: float) -> None:
-        for _ in range(TWIN_STEPS):
-            self.x = np.array(self.twin.step(self.x, self.u, self.p, duration / TWIN_STEPS)).ravel()
+        count = max(TWIN_STEPS, math.ceil(length(self.x[4:7]) * duration / TWIN_ANGLE))
+        for _ in range(count):
+            self.x = np.array(self.twin.step(self.x, self.u, self.p, duration / count)).ravel()
 
     @property
     def angular_velocity(self) -> Array:
         return self.x[4:7]
 
     @property
+    def rates(self) -> Array:
+        return self.x[4:]
+
+    @property
     def attitude(self) -> Array:
         return self.x[:4]
 
 
-# A step of order eight then turns a hundredth of a radian or so.
-TWIN_STEPS = 50
+# A step of order eight turns a hundredth of a radian or so, at most TWIN_ANGLE, which is off by some 1e-12,
+# once a body has become light and turns fast.
+TWIN_STEPS, TWIN_ANGLE = 50, 0.1
 
 # DOP853 at rtol 1e-13 over some radians.
 FLIGHT_ERROR = 1e-11
 
 
 def flight(
-    flown: Scene, attitude: Array, angular_velocity: Array, values: Values, duration: float
+    flown: Scene, attitude: Array, rates: Array, values: Values, duration: float
 ) -> tuple[Array, Array]:
-    """Returns the state after a flight, (7,), and the impulse of the torque, (3,) [N m s], inertial axes."""
-    locked, stored = stored_in_wheels(flown, values)
-    J = reference.composite(flown, values).inertia - locked
-    h = reference.internal_momentum(flown, values) + stored
+    """Returns the state after a flight, (7 + n,), and the impulse of the torque, (3,) [N m s], inertial axes.
+
+    rates : angular velocity and momenta of wheels, (3 + n,)
+    """
+    J, h = reference.composite(flown, values).inertia, reference.internal_momentum(flown, values)
     torque, law = reference.external_torque(flown, values), flown.rotation.law
+    wheels, impulse = reference.wheels_of(flown, rates[3:], values), slice(4 + len(rates), None)
 
     def rate(_: float, y: Array) -> Array:
-        acceleration = reference.angular_acceleration(law, J, y[4:7], torque, h)
+        held = h - wheels.carried + y[7 : impulse.start] @ wheels.axes
+        acceleration = reference.angular_acceleration(
+            law, J - wheels.inertia, y[4:7], torque + wheels.reaction, held
+        )
         unit = y[:4] / np.linalg.norm(y[:4])
         impulse_dot = reference.rotation_matrix(unit) @ torque
-        return np.concatenate([reference.attitude_dot(y[:4], y[4:7]), acceleration, impulse_dot])
+        return np.concatenate(
+            [reference.attitude_dot(y[:4], y[4:7]), acceleration, wheels.torques, impulse_dot]
+        )
 
-    start = np.concatenate([attitude, angular_velocity, np.zeros(3)])
+    start = np.concatenate([attitude, rates, np.zeros(3)])
     end = solve_ivp(rate, (0.0, duration), start, "DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
-    return end[:7], end[7:]
-
-
-def stored_in_wheels(flown: Scene, values: Mapping[str, float]) -> tuple[Array, Array]:
-    """Returns A = sum I b b^T, (3, 3) [kg m2], of the wheels of what is joined to the root, and what they add
-    to the momentum h of what moves, (3,) [N m s]: h_w b less I b (b . k) that their vessel's rate k does not
-    turn along. Body axes.
-    """
-    locked, stored = np.zeros((3, 3)), np.zeros(3)
-    for name, motion in reference.motions(flown, values).items():
-        for wheel in flown.vessels[name].wheels.values():
-            b = motion.rotation @ (np.array(wheel.axis) / np.linalg.norm(wheel.axis))
-            locked += wheel.inertia * np.outer(b, b)
-            stored += (wheel.momentum - wheel.inertia * (b @ motion.rate)) * b
-    return locked, stored
+    return end[: impulse.start], end[impulse]
 
 
 # The books
@@ -439,9 +485,12 @@ def length(vector: Any) -> Any:
     return np.sqrt(vector @ vector)
 
 
-def parts(flown: Scene, angular_velocity: Array, values: Mapping[str, float]) -> dict[str, Part]:
-    """Returns each vessel that is joined to the root, as it moves."""
-    omega, found = angular_velocity.astype(Long), {}
+def parts(flown: Scene, rates: Array, values: Mapping[str, float]) -> dict[str, Part]:
+    """Returns each vessel that is joined to the root, as it moves; its wheels hold what they hold.
+
+    rates : angular velocity and momenta of wheels, (3 + n,)
+    """
+    omega, found = rates[:3].astype(Long), {}
     for name, motion in reference.motions(flown, values).items():
         vessel = flown.vessels[name]
         mass, pmi = Long(values.get(f"{name}.mass", vessel.mass)), np.array(vessel.pmi)
@@ -449,14 +498,21 @@ def parts(flown: Scene, angular_velocity: Array, values: Mapping[str, float]) ->
         R, r = motion.rotation.astype(Long), motion.origin.astype(Long)
         turning = omega + motion.rate
         momentum = R @ (mass * pmi * (R.T @ turning))
-        size = length(momentum)
-        for wheel in vessel.wheels.values():  # which no change of inputs speeds up or slows down
-            b = R @ (np.array(wheel.axis, Long) / length(np.array(wheel.axis, Long)))
-            own = (Long(wheel.momentum) - Long(wheel.inertia) * (b @ turning)) * b
-            momentum, size = momentum + own, size + length(own)
-        velocity = motion.velocity + np.cross(omega, r)
+        velocity, size = motion.velocity + np.cross(omega, r), length(momentum)
+        for i, wheel in enumerate(flown.wheels):
+            if wheel.partition(".")[0] == name:
+                axis = R @ unit(flown.wheel(wheel).axis)
+                locked = Long(flown.wheel(wheel).inertia) * (axis @ turning)
+                momentum = momentum + axis * (Long(rates[3 + i]) - locked)
+                size += abs(locked) + abs(rates[3 + i])
         found[name] = Part(mass, r, velocity, momentum, size)
     return found
+
+
+def unit(vector: Iterable[float]) -> Any:
+    """Returns a vector at unit length, in extended precision."""
+    long = np.array(list(vector), dtype=Long)
+    return long / length(long)
 
 
 def whole(of: Iterable[Part]) -> Part:
@@ -482,7 +538,7 @@ def touching(flown: Scene, before: Values, after: Values) -> Values:
 def books(flown: Scene, before: Values, after: Values, old: Array, new: Array) -> tuple[float, float]:
     """Returns what is missing in the books of momentum over a change, and the sum of its terms [N m s].
 
-    old, new : angular velocities
+    old, new : angular velocities and momenta of wheels, (3 + n,)
     H is that of all that stays joined, about its barycentre. It changes by mass that leaves or arrives moving
     with the body, where the scene says so, and by parts that arrive with momentum of their own.
     """
@@ -500,11 +556,9 @@ def books(flown: Scene, before: Values, after: Values, old: Array, new: Array) -
     kept = held.momentum + flow
     arriving = [name for name in reference.poses(flown, after) if name not in reference.poses(flown, moved)]
     if arriving:
-        locked, stored = stored_in_wheels(flown, moved)
-        J = reference.composite(flown, moved).inertia - locked
-        inner = reference.internal_momentum(flown, moved) + stored
-        rate = np.linalg.solve(J, kept.astype(float) - inner)
-        meeting = parts(flown, rate, touching(flown, before, after))
+        stored = old[3:]
+        rate = reference.angular_velocity(flown, np.array([*kept.astype(float), *stored]), moved)
+        meeting = parts(flown, np.array([*rate, *stored]), touching(flown, before, after))
         base = whole(part for name, part in meeting.items() if name not in arriving)
         others = [meeting[name] for name in arriving]
         together = whole([base, *others])

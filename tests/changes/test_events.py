@@ -141,7 +141,7 @@ def test_event_mode_may_be_left_without_an_update(raw, fmi):
             assert instance.run() == OK
         else:
             assert instance._status(instance.fmu.enterContinuousTimeMode) == OK
-        rates = driver.rates(0.0, driver.states, {"tank.mass": 123.0})
+        rates = driver.states_dot(0.0, driver.states, {"tank.mass": 123.0})
         found.append([*driver.states, *rates, *driver.angular_velocity])
         instance.free()
     assert found[0] == found[1]
@@ -184,7 +184,7 @@ def test_states_that_are_read_first_follow_from_what_was_set(raw, place):
 def test_what_is_read_after_the_end_is_what_was_there(raw, fmi):
     driver = ByExchange(raw, fmi)
     instance = driver.instance
-    driver.rates(1.0, 2.0 * driver.states)
+    driver.states_dot(1.0, 2.0 * driver.states)
     assert instance.set({"tank.mass": 123.0}) == OK
     states = driver.states.tolist()
     assert instance._status(instance.fmu.terminate) == OK

@@ -97,11 +97,11 @@ CHANGE_ERROR = 256 * EPS
 @FMI
 def test_inputs_that_step_in_continuous_time_change_the_rate_at_once(fmi):
     driver = ByExchange(TUG, fmi)
-    driver.rates(0.0, driver.states, drawn_in(DURATION))
+    driver.states_dot(0.0, driver.states, drawn_in(DURATION))
     omega = np.array(TUG["rotation"]["angular_velocity"])
     expected = reference.change(scene(TUG), omega, {}, drawn_in(DURATION))
     assert np.abs(driver.angular_velocity - expected).max() <= CHANGE_ERROR * np.abs(expected).max()
-    driver.rates(0.0, driver.states, drawn_in(0.0))
+    driver.states_dot(0.0, driver.states, drawn_in(0.0))
     assert np.abs(driver.angular_velocity - omega).max() <= CHANGE_ERROR * np.abs(omega).max()
 
 
@@ -151,14 +151,14 @@ def test_a_mixture_refuses_moving_poses_in_continuous_time_and_keeps_its_state(f
     moved = elements("tug.arm.position", (2.5, 0.5, 0.0))
     assert driver.instance.set(moved) == OK
     with pytest.raises(FMICallException):
-        driver.rates(0.0, driver.states)
+        driver.states_dot(0.0, driver.states)
     assert (
         "tug.arm.position[1] = 2.5 m: changed from 3 in continuous-time mode"
         in driver.instance.messages()[-1]
     )
     assert driver.states.tolist() == states
     assert driver.instance.set(elements("tug.arm.position", (3.0, 0.5, 0.0))) == OK
-    assert np.isfinite(driver.rates(0.0, driver.states)).all()
+    assert np.isfinite(driver.states_dot(0.0, driver.states)).all()
 
 
 @FMI
