@@ -348,7 +348,7 @@ def _method_sources(
     force = found.torque + speed * (found.inertia * speed + found.spin)
     rounding = 0.5 * EPSILON * (4.0 * speed * sub_steps + DEPTH * step * found.lightness * force)
     rounding += 0.5 * EPSILON * CHANGES * CHANGE_DEPTH * (found.change_speed * speed + found.change_spin)
-    rate = constants.rate * v * power * bool(LAWS[scene.rotation.law].products) + rounding
+    rate = float(constants.rate) * v * power * bool(LAWS[scene.rotation.law].products) + rounding
     turn = pi * (
         float(constants.turn) * power
         + 0.5 * EPSILON * (8.0 * sub_steps + DEPTH * step * speed)

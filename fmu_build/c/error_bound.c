@@ -15,7 +15,7 @@
 
 static const double PI = 3.14159265358979323846;
 
-enum { ANGLE, ENERGY, RATE };
+enum { ANGLE, ENERGY, RATE, PLACE };
 
 static bool says_nothing(const Dynamics *now) {
     return !(now->bound[ANGLE] < PI);
@@ -163,9 +163,19 @@ static bool follow_change(Instance *instance) {
     return isfinite(instance->now.bound[ENERGY]);
 }
 
+/* Where a communication step starts the place is what the inputs say. */
+static void forget_place(Instance *instance) {
+#if FIELD
+    instance->now.bound[PLACE] = 0.0;
+#else
+    (void)instance;
+#endif
+}
+
 /* Composites on the way of a change are judged by nobody else: the importer is to see no flag that they raise. */
 void bound_over_change(Instance *instance) {
     const Dynamics *now = &instance->now;
+    forget_place(instance);
     if (says_nothing(now) || memcmp(now->p, now->bound_from.p, INPUT_P_COUNT * sizeof(double)) == 0) return;
     fenv_t importers;
     feholdexcept(&importers);
@@ -211,13 +221,19 @@ static bool carry(Instance *instance, const double x[], double size, const Progr
     composite_refresh_axes(instance);
     const double power = progress->was_free ? 0.0 : progress->exponent;
     const double s[4] = {size, power, progress->found[0], progress->found[1]};
-    const double sizes = sum_of_sizes(x + 4, 3) + sum_of_sizes(s, 4) + sum_of_sizes(now->bound, 3) +
+    const double sizes = sum_of_sizes(x + 4, 3) + sum_of_sizes(s, 4) + sum_of_sizes(now->bound, sizeof now->bound / sizeof *now->bound) +
                          sum_of_sizes(&now->values[REFERENCE_TORQUE], INPUT_U_COUNT);
     const bool tame = now->constants_are_tame && sizes <= TAME_STEP;
     if (!tame && !(instance_is_ordinary(instance) && are_within(x, STATE_COUNT, ORDINARY))) return false;
-    double after[3];
+    double after[sizeof now->bound / sizeof *now->bound];
     instance_set_arguments(instance);
     instance->arg[0] = x;
+#if FIELD
+    double acted[INPUT_U_COUNT];
+    memcpy(acted, instance->acting, sizeof acted);
+    memcpy(&acted[FIELD_PLACE], instance->left, sizeof instance->left);
+    instance->arg[1] = acted;
+#endif
     instance->arg[4] = s;
     instance->arg[5] = now->bound;
     instance->res[0] = after;

@@ -1,7 +1,7 @@
 /* Where the body is in a field of gravity: judged, and followed within a communication step, along which the centre moves
    by two-body motion from what the inputs say at its start. Without a field nothing of this is there.
 
-   Of the instance it owns acting, moved and moves. */
+   Of the instance it owns acting, moved, left and moves. */
 #ifndef FIELD_H
 #define FIELD_H
 
@@ -33,6 +33,7 @@ static inline void field_result(Instance *instance) {
     instance->res[2] = instance->moved;
 }
 static inline void field_move(Instance *instance) {
+    memcpy(instance->left, field_of(instance), sizeof instance->left);
     memcpy(field_of(instance), instance->moved, sizeof instance->moved);
 }
 

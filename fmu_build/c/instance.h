@@ -114,7 +114,8 @@ typedef struct {
     double stop_time;                 /* s, meaningful if stop_time_defined */
     double tolerance;                 /* the importer's or the scene's */
     double errors[2];                 /* rad: the estimate of the last communication step; the bound since the start */
-    double bound[ERROR_BOUND ? 3 : 1]; /* of the angle, rad; of the rate in the energy norm, J^(1/2); of the rate, rad/s */
+    double bound[ERROR_BOUND ? 3 + FIELD : 1]; /* of the angle, rad; of the rate in the energy norm, J^(1/2); of the rate,
+                                                  rad/s; of the place in a field of gravity, over the distance */
     struct {
         double rate[ERROR_BOUND ? 3 : 1], c[ERROR_BOUND ? COMPOSITE_COUNT : 1], p[ERROR_BOUND ? INPUT_P_COUNT + 1 : 1];
     } bound_from;                     /* rate, composite and inputs that the bound's next change begins from */
@@ -170,6 +171,7 @@ struct Instance {
 #if FIELD
     double acting[INPUT_U_COUNT];     /* the inputs u within a communication step, see field.h */
     double moved[6];                  /* m, m/s: where a sub-step ends, before it is taken */
+    double left[6];                   /* where the last one began */
     bool moves;                       /* the model is given `acting` */
 #endif
 

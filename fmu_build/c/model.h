@@ -11,7 +11,8 @@
      c, d [COMPOSITE_COUNT]  composites
      a [AXES_COUNT]       principal moments and axes
      e [2]                estimated error of the last communication step, and bound of the error, rad
-     b [3]                bound of the error: angle, rad; of the rate, energy norm, J^(1/2), and length, rad/s
+     b [3 or 4]           bound of the error: angle, rad; of the rate, energy norm, J^(1/2), and length, rad/s; in a field
+                          of gravity of the place within a communication step, over the distance
      s [4]                a sub-step: its size, s; one more than its order, 0: free; its error estimated, rad and rad/s
      y [OUTPUT_COUNT]     outputs
      omega, momentum [3]  rad/s, N.m.s; as arguments of changes, but for dH, with momenta of wheels behind them,

@@ -440,6 +440,13 @@ def test_roundings_that_follow_on_each_other_are_fewer_than_allowed(method: str)
     step = bound_function("tensor", method)
     end = step.call([x, ca.SX.zeros(2), six, M, ca.SX.zeros(3), h])[0]
     function = ca.Function("step", [x, six, M, h], [end])
+    deepest = longest_path(function)
+    print(method, deepest)
+    assert deepest <= DEPTH
+
+
+def longest_path(function: ca.Function) -> int:
+    """Returns how many operations of a function follow on each other at most."""
     depth: dict[int, int] = {}
     deepest = 0
     for k in range(function.n_instructions()):
@@ -454,5 +461,4 @@ def test_roundings_that_follow_on_each_other_are_fewer_than_allowed(method: str)
             deepest = max(deepest, depth[into[0]])
         else:
             depth[out[0]] = 1 + max(depth[i] for i in into)
-    print(method, deepest)
-    assert deepest <= DEPTH
+    return deepest

@@ -1,6 +1,7 @@
 """The numbered equations of model/docs/error_bound.md with mpmath at 30 digits, not by the library."""
 
 import re
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,14 @@ import mpmath
 import numpy as np
 import pytest
 
-from supervessel.rotation.error_bound import carried, constants, remainder
+from supervessel.rotation.error_bound import (
+    carried,
+    centre_motion,
+    constants,
+    functions,
+    remainder,
+)
+from supervessel.rotation.error_bound import majorants as scalar_problems
 from supervessel.rotation.error_bound.remainder import RK4_STAGES, RK4_WEIGHTS, remainder_of
 from supervessel.rotation.propagators import dop853
 from supervessel.twin import bounds
@@ -209,12 +217,129 @@ def test_majorant_of_the_law_is_the_square_of_a_shifted_one() -> None:
         assert alpha + beta * y + g * y * y <= g * (y + shift) ** 2 + CLOSE
 
 
+@pytest.mark.parametrize("seed", SEEDS)
+def test_gradients_of_two_attitudes_and_what_a_law_leaves_out_of_one(seed: int) -> None:
+    """[EB] eqs. (43) to (46): bounds by moments; the residual, and how far it goes with the direction."""
+    random = np.random.default_rng(seed)
+    J = tensor(random)
+    D = mp.diag([J[i, i] for i in range(3)])
+    L, moments = mp.cholesky(J), mp.eigsy(J, eigvals_only=True)
+    a, b = (x / mp.norm(x) for x in (vector(random), vector(random)))
+    if seed % 2:
+        b = a + b / 1000
+        b /= mp.norm(b)
+    theta = 2 * mp.asin(mp.norm(a - b) / 2)
+
+    def torque(K: Any, n: Any) -> Any:
+        return cross(n, K * n)
+
+    apart = L**-1 * (torque(J, a) - torque(J, b))
+    assert mp.norm(apart) <= (moments[2] - moments[0]) / mp.sqrt(moments[0]) * theta
+    least, largest = min(D[i, i] for i in range(3)), max(D[i, i] for i in range(3))
+    assert mp.norm(mp.cholesky(D) ** -1 * torque(D, a)) <= (largest - least) / (2 * mp.sqrt(least))
+
+    def left(x: Any, y: Any) -> Any:
+        """P of (45), made symmetric."""
+        sums = [(cross(x, K * y) + cross(y, K * x)) / 2 for K in (D, J)]
+        return L**-1 * (J * D**-1 * sums[0] - sums[1])
+
+    omega, M = vector(random), vector(random)
+    w_dot = D**-1 * (M + torque(D, a) - cross(omega, D * omega))
+    delta = J * w_dot - M - torque(J, a) + cross(omega, J * omega)
+    without = J * D**-1 * (M - cross(omega, D * omega)) - M + cross(omega, J * omega)
+    assert mp.norm(L**-1 * (delta - without) - left(a, a)) < CLOSE
+    units = [mp.matrix([int(i == j) for j in range(3)]) for i in range(3)]
+    rho = mp.sqrt(sum(mp.norm(left(x, y)) ** 2 for x in units for y in units))
+    s0, s1 = mp.mpf("0.9"), mp.mpf("1.2")
+    moved = mp.norm(s1 * left(b, b) - s0 * left(a, a))
+    assert moved <= rho * (2 * s1 * min(theta, 1) + (s1 - s0))
+
+
+def test_angle_and_energy_that_drive_each_other_are_bounded_from_above() -> None:
+    """[EB] eq. (50), against the solution of the linear system as a series, close for short steps."""
+    random = np.random.default_rng(4)
+    for number in range(200):
+        lam, gamma, k, r, h, e0, t0 = (mp.mpf(float(x)) for x in random.uniform(0, 1, size=7))
+        h *= mp.mpf(10) ** -(number % 4)
+        A = mp.matrix([[lam, gamma, r], [k, 0, 0], [0, 0, 0]])
+        energy, angle, _ = mp.expm(A * h) * mp.matrix([e0, t0, 1])
+        E = mp.exp(lam * h)
+        B = h * (1 + E) / 2
+        zeta = B * gamma * k * h / 4
+        e1 = ((E + zeta) * e0 + B * (r + gamma * t0)) / (1 - zeta)
+        t1 = t0 + k * h * (e0 + e1) / 2
+        assert energy <= e1 <= energy + h**3 * (e0 + t0 + r) + CLOSE
+        assert angle <= t1 <= angle + h**3 * (e0 + t0 + r) + CLOSE
+
+
+def orbiting_series(count: int) -> list[list[Any]]:
+    """Returns coefficients of V, Q, X and Y of [EB] eq. (48), found one after the other."""
+    parts = [[mp.mpf(1)] for _ in range(4)]
+
+    def last(*factors: list[Any]) -> Any:
+        """Returns the last coefficient of a product."""
+        product = factors[0]
+        for factor in factors[1:]:
+            product = [sum(product[j] * factor[i - j] for j in range(i + 1)) for i in range(len(product))]
+        return product[-1]
+
+    def raised(s: list[Any], a: Any) -> list[Any]:
+        """Returns (2 - s)^a by the binomial series about s = 1."""
+        small = [mp.mpf(0), *s[1:]]
+        found, term = [mp.mpf(0)] * len(s), [mp.mpf(1)] + [mp.mpf(0)] * (len(s) - 1)
+        for n in range(len(s)):
+            found = [x + (-1) ** n * mp.binomial(a, n) * y for x, y in zip(found, term, strict=True)]
+            term = [sum(term[j] * small[i - j] for j in range(i + 1)) for i in range(len(s))]
+        return found
+
+    def squared(s: list[Any]) -> list[Any]:
+        return [sum(s[j] * s[i - j] for j in range(i + 1)) for i in range(len(s))]
+
+    for k in range(1, count):
+        V, Q, X, Y = parts
+        q, x = squared(Q), squared(X)
+        psi = last(q, q, x, raised(q, -2), raised(x, mp.mpf(-5) / 2)) - (k == 1)
+        rates = (
+            last(V, V) + psi / 2,
+            last(Q, V) / 2,
+            Y[-1] / 2,
+            last(X, raised(x, mp.mpf(-3) / 2)) / 2,
+        )
+        for part, rate in zip(parts, rates, strict=True):
+            part.append(rate / k)
+    return parts
+
+
+def test_constants_of_the_remainder_in_orbit_are_those_of_its_majorant() -> None:
+    """[EB] eqs. (48), (49): the exact series found another way; values and tails at the limits."""
+    V, Q, X, Y = parts = orbiting_series(22)
+    known = scalar_problems.exact_series(scalar_problems.turning_in_orbit, 4)
+    for part, found in zip(parts, known, strict=True):
+        for one, other in zip(part, found, strict=False):
+            assert abs(one - mp.mpf(str(other))) <= CLOSE * (1 + one)
+        ratios = [float(b / a) for a, b in pairwise(found[4:])]
+        assert max(ratios) <= 4.0  # what `exact_tails` asks of limits up to 1/8
+    rho = mp.mpf("0.3")
+    values = [sum(mp.mpf(str(c)) * rho**i for i, c in enumerate(part)) for part in known]
+    limits = (values[0], values[1], values[1] ** 2 * values[3], values[3])
+    for value, found in zip(limits, remainder.TAYLOR_VALUES, strict=True):
+        assert 0.99 * found < value < found
+    assert values[3] > values[2]
+    for order in (6, 12, 20):
+        constants = remainder_of("taylor", order, in_orbit=True)
+        for part, limit in ((known[0], constants.rate), (known[1], constants.turn)):
+            z = mp.mpf(constants.limit)
+            tail = sum(mp.mpf(str(c)) * z**i for i, c in enumerate(part) if i > order) / z ** (order + 1)
+            assert tail <= limit
+    assert (len(V), len(Q), len(X), len(Y)) == (22,) * 4
+
+
 def test_equations_are_numbered_in_order_and_the_code_cites_none_that_is_missing() -> None:
     model = Path(carried.__file__).parents[3]
     page = (model / "docs" / "error_bound.md").read_text(encoding="utf-8")
     tags = [int(number) for number in re.findall(r"\\tag\{(\d+)\}", page)]
     assert tags == list(range(1, len(tags) + 1))
-    for module in (carried, constants, remainder, bounds):
+    for module in (carried, centre_motion, constants, functions, scalar_problems, remainder, bounds):
         text = Path(module.__file__).read_text(encoding="utf-8")
         cited = re.findall(r"\[EB\]\s+eqs?\.((?:(?:\s|,|to|and)*\(\d+\))+)", text)
         numbers = {int(number) for group in cited for number in re.findall(r"\d+", group)}

@@ -54,7 +54,8 @@ def step_functions(
     """
     h = ca.SX.sym("h")
     shown = "error_estimate" in scene.outputs.names
-    estimated = shown or ("error_bound" in scene.outputs.names and not has_sure_remainder(scene.rotation))
+    has_sure = has_sure_remainder(scene.rotation, in_orbit=dynamics.field is not None)
+    estimated = shown or ("error_bound" in scene.outputs.names and not has_sure)
     state, rate = _extended(symbols[0], dynamics)
     motion = StepSymbols(
         state,

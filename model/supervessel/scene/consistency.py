@@ -177,6 +177,10 @@ def _gravity(raw: Mapping[str, Any]) -> Iterator[str]:
             yield f"gravity.{key}: missing, and no [experiment.orbit]; {needs}"
     if asked and "accuracy" in raw and orbit is None:
         yield "experiment.orbit: missing; [accuracy] flies along it where inputs.gravity is true"
+    rotation = raw.get("rotation")
+    still = isinstance(rotation, Mapping) and rotation.get("law") == "none"
+    if asked and still and _shows_bound(raw):
+        yield f"outputs.names: error_bound: {NO_BOUND_IN_ORBIT}"
     courses = experiment.get("inputs") if isinstance(experiment, Mapping) else None
     if orbit is None or not isinstance(courses, Mapping):
         return
@@ -233,6 +237,13 @@ def _propagator(raw: Mapping[str, Any]) -> Iterator[str]:
     reason = method.reason_against(str(rotation.get("law", "")), inputs, has_wheels(raw)) if method else ""
     if reason:
         yield f'rotation.propagator = "{name}": {reason}'
+
+
+NO_BOUND_IN_ORBIT = (
+    'rotation.law = "none" with inputs.gravity has no bound, which follows the place that this law does not; '
+    'take another law, "decoupled" costs hardly more'
+)
+"""Why no bound is carried under the law none in a field of gravity."""
 
 
 def _shows_bound(raw: Mapping[str, Any]) -> bool:

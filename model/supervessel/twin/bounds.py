@@ -15,6 +15,7 @@ from supervessel.rotation.error_bound.functions import body_of, bound_after_step
 from supervessel.rotation.error_bound.remainder import Remainder, remainder_of, step_error
 from supervessel.rotation.propagators import name_of
 from supervessel.rotation.propagators.taylor import taylor_order
+from supervessel.scene.consistency import NO_BOUND_IN_ORBIT
 
 Parts = Mapping[str, ca.SX]
 
@@ -24,13 +25,16 @@ def bound_over_step(model: Equations, parts: Parts, bound: ca.SX, at: tuple[ca.S
 
     parts : of the composite by name, expressions
     at    : state x at the start, (7,), inputs that act u, step h [s]
-    Raises ValueError for a method whose steps have no bound.
+    Raises ValueError for a method whose steps have no bound, and for the law "none" in a field of gravity.
     """
     x, u, h = at
+    scene = model.resolved.scene
+    if scene.gravity is not None and scene.rotation.law == "none":
+        raise ValueError(f"error_bound: {NO_BOUND_IN_ORBIT}")
     dynamics = dynamics_of(model.resolved, parts, u)
     constants, body = constants_of(dynamics), body_of(dynamics)
-    found, motion = bound_after_step(constants, body, x, h, bound)
-    return found + step_error(method_remainder(model), constants, body, motion)
+    found = bound_after_step(constants, body, x, h, bound)
+    return found.bound + step_error(method_remainder(model), constants, body, found.motion)
 
 
 def inertia_of(c: ca.SX) -> ca.SX:
@@ -48,7 +52,8 @@ def method_remainder(model: Equations) -> Remainder | None:
         raise ValueError(
             'error_bound: propagator = "split" has no proven bound of its steps: must be another one'
         )
-    return remainder_of(name, taylor_order(tolerance) if name == "taylor" else 0)
+    order = taylor_order(tolerance) if name == "taylor" else 0
+    return remainder_of(name, order, in_orbit=model.has_field)
 
 
 def bound_over_change(

@@ -10,11 +10,12 @@ is linearised and no sample stands for a span of time. Steps of a method are in 
 [EB].
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import casadi as ca
 
 from supervessel.composite.inertia import symmetric
+from supervessel.rotation.error_bound.centre_motion import CentreMotion
 from supervessel.rotation.error_bound.constants import (
     BoundConstants,
     EnergyNorm,
@@ -22,6 +23,7 @@ from supervessel.rotation.error_bound.constants import (
     largest_of_traceless,
     norm_of,
 )
+from supervessel.rotation.gravity import Field, products_of
 from supervessel.rotation.laws import MIXED_PRODUCTS, SQUARES, RotationLaw
 
 INFLATION = 1.0 + 2.0**-44
@@ -42,11 +44,15 @@ def growth(norm: EnergyNorm, rate: ca.SX) -> ca.SX:
 
 @dataclass(frozen=True)
 class TurnedBody:
-    """What turns a body: tensor J, (3, 3) [kg m2], torque M, (3,) [N m], spin h, (3,) [N m s]; body axes."""
+    """What turns a body: tensor J, (3, 3) [kg m2], torque M, (3,) [N m], spin h, (3,) [N m s]; body axes.
+
+    field : the field of gravity whose gradient does so too; None where there is none
+    """
 
     inertia: ca.SX
     torque: ca.SX
     spin: ca.SX
+    field: Field | None = None
 
 
 @dataclass(frozen=True)
@@ -58,7 +64,9 @@ class MotionBounds:
     speed        : |w_0| [rad/s]
     reach        : |w| <= reach [rad/s]
     fastest      : |w'| <= fastest [rad/s2]
-    scale, share : v [rad/s] and z of [EB] eq. (24)
+    scale, share : v [rad/s] and z of [EB] eq. (24), in a field of gravity of (47)
+    centre       : how the attracting centre moves meanwhile; None where there is none
+    pace         : nu [rad/s] of [EB] eq. (47); 0 where there is no centre
     """
 
     start: ca.SX
@@ -68,6 +76,8 @@ class MotionBounds:
     fastest: ca.SX
     scale: ca.SX
     share: ca.SX
+    centre: CentreMotion | None = None
+    pace: ca.SX = field(default_factory=lambda: ca.SX(0.0))
 
     @property
     def away(self) -> ca.SX:
@@ -75,28 +85,52 @@ class MotionBounds:
         return ca.fmin(self.step * self.fastest, self.speed + self.reach)
 
 
-def motion_bounds(constants: BoundConstants, body: TurnedBody, rate: ca.SX, step: ca.SX) -> MotionBounds:
-    """Returns where a law's rate may be over a step, proven. [EB] eqs. (12) to (15), (24).
+def motion_bounds(
+    constants: BoundConstants,
+    body: TurnedBody,
+    rate: ca.SX,
+    step: ca.SX,
+    centre: CentreMotion | None = None,
+) -> MotionBounds:
+    """Returns where a law's rate may be over a step, proven. [EB] eqs. (12) to (15), (24), (44), (47).
 
-    rate : at the start of the step, (3,) [rad/s]
-    step : [s], any length
+    rate   : at the start of the step, (3,) [rad/s]
+    step   : [s], any length
+    centre : how the attracting centre moves meanwhile; None where gravity's gradient does not turn the body
     """
     law, numbers, g = constants.law, constants.numbers, constants.coupling
     by_torque = law.acceleration(numbers, ca.SX.zeros(3), body.torque)
     push, speed = ca.norm_2(by_torque), ca.norm_2(rate)
+    by_gradient, lift = ca.SX(0.0), ca.SX(0.0)
+    if centre is not None and constants.gradient is not None:
+        by_gradient = centre.strongest * constants.gradient.push
+        lift = centre.strongest * constants.gradient.lift
+    push += by_gradient
     if not law.gyroscopic_term:
         v = speed + ca.sqrt(push / g)
         reach = speed + step * push
-        return MotionBounds(rate, step, speed, reach, push, v, g * v * step)
-    spin = ca.norm_fro(by_spin(law, numbers, body.spin))
-    v = speed + ca.fmax(ca.sqrt(push / g), 0.5 * spin / g)
-    z = g * v * step
-    near = speed + v * z / (1.0 - ca.fmin(z, 0.5))
-    energy = ca.sqrt(ca.dot(rate, law.turning(body.inertia) @ rate))
-    energy += step * ca.sqrt(ca.fmax(ca.dot(body.torque, by_torque), 0.0))
-    reach = ca.fmin(ca.if_else(z <= 0.5, near, ca.inf), constants.own_share * energy)
-    fastest = push + reach * (spin + g * reach)
-    return MotionBounds(rate, step, speed, reach, fastest, v, z)
+        found = MotionBounds(rate, step, speed, reach, push, v, g * v * step)
+    else:
+        spin = ca.norm_fro(by_spin(law, numbers, body.spin))
+        v = speed + ca.fmax(ca.sqrt(push / g), 0.5 * spin / g)
+        z = g * v * step
+        near = speed + v * z / (1.0 - ca.fmin(z, 0.5))
+        energy = ca.sqrt(ca.dot(rate, law.turning(body.inertia) @ rate))
+        energy += step * (ca.sqrt(ca.fmax(ca.dot(body.torque, by_torque), 0.0)) + lift)
+        reach = ca.fmin(ca.if_else(z <= 0.5, near, ca.inf), constants.own_share * energy)
+        fastest = push + reach * (spin + g * reach)
+        found = MotionBounds(rate, step, speed, reach, fastest, v, z)
+    return found if centre is None else _in_orbit(found, g, by_gradient, centre)
+
+
+def _in_orbit(motion: MotionBounds, g: ca.SX, by_gradient: ca.SX, centre: CentreMotion) -> MotionBounds:
+    """Returns the motion with v and z as they count in a field of gravity. [EB] eq. (47).
+
+    by_gradient : bound of the acceleration by the gradient [rad/s2]
+    """
+    v = ca.fmax(motion.scale, ca.sqrt(2.0 * by_gradient / g))
+    pace = ca.fmax(ca.fmax(g, 1.0) * v, 2.0 * centre.pace)
+    return replace(motion, scale=v, share=pace * motion.step, centre=centre, pace=pace)
 
 
 def by_spin(law: RotationLaw, numbers: ca.SX, spin: ca.SX) -> ca.SX:
@@ -125,8 +159,9 @@ def largest_growth(constants: BoundConstants, motion: MotionBounds) -> ca.SX:
 
 
 def largest_residual(constants: BoundConstants, body: TurnedBody, motion: MotionBounds) -> ca.SX:
-    """Returns a bound of |L^-1 delta| [J^(1/2)/s] over a step, 0 for the exact law. [EB] eqs. (17) to (19).
+    """Returns a bound of |L^-1 delta| [J^(1/2)/s] over a step, 0 for the exact law.
 
+    [EB] eqs. (17) to (19), (45), (46).
     motion : of the cheap law
     """
     left_out, w, away = constants.left_out, motion.start, motion.away
@@ -138,7 +173,13 @@ def largest_residual(constants: BoundConstants, body: TurnedBody, motion: Motion
     if left_out.by_rate is not None:
         first += left_out.by_rate @ w
         slope += ca.norm_fro(left_out.by_rate)
-    return ca.norm_2(first) + slope * away
+    gradient, centre = constants.gradient, motion.centre
+    if gradient is None or gradient.left_out is None or centre is None:
+        return ca.norm_2(first) + slope * away
+    first += centre.strength * (gradient.left_out @ products_of(centre.direction))
+    turned = ca.fmin(motion.step * motion.reach + centre.turn, 1.0)
+    by_place = gradient.bend * (centre.change + 2.0 * (centre.strongest * turned))
+    return ca.norm_2(first) + slope * away + by_place
 
 
 STEEPEST = 64.0
@@ -157,6 +198,42 @@ def carried(bound: ca.SX, rate_share: ca.SX, growth: ca.SX, residual: ca.SX, ste
     energy = bound[1] * rise + residual * step * (0.5 * (1.0 + rise))
     angle = bound[0] + rate_share * step * (0.5 * (bound[1] + energy))
     return INFLATION * ca.vertcat(angle, energy) + ca.if_else(exponent > STEEPEST, ca.inf, 0.0)
+
+
+STIFFEST = 0.5
+"""Largest share of itself that an angle grows by over a step whose bound is finite. [EB] eq. (50)."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What makes the norm of the rate's error grow, at most, over a step in a field of gravity.
+
+    growth   : lambda [rad/s], times the norm
+    residual : [J^(1/2)/s]
+    coupling : [J^(1/2)/s], times the angle
+    """
+
+    growth: ca.SX
+    residual: ca.SX
+    coupling: ca.SX
+
+
+def carried_in_orbit(bound: ca.SX, rate_share: ca.SX, drive: Drive, step: ca.SX) -> ca.SX:
+    """Returns the bound, (2,) [rad, J^(1/2)], a step later, where an angle grows a rate too. [EB] eq. (50).
+
+    rate_share : k of |e| <= k |e|_J
+    """
+    angle, energy = bound[0], bound[1]
+    exponent = drive.growth * step
+    rise = ca.exp(ca.fmin(exponent, STEEPEST))
+    span, half = step * (0.5 * (1.0 + rise)), 0.5 * rate_share * step
+    pull = 0.5 * span * drive.coupling
+    stiff = pull * half
+    known = ca.logic_and(stiff <= STIFFEST, exponent <= STEEPEST)
+    grown = (rise + stiff) * energy + drive.residual * span + 2.0 * pull * angle
+    after = grown / (1.0 - ca.fmin(stiff, STIFFEST))
+    turned = angle + half * (energy + after)
+    return INFLATION * ca.vertcat(turned, after) + ca.if_else(known, 0.0, ca.inf)
 
 
 def kept_rate(energy: ca.SX, before: ca.SX, after: ca.SX) -> ca.SX:

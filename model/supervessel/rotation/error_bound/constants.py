@@ -10,6 +10,7 @@ import casadi as ca
 
 from supervessel.composite.inertia import UPPER_TRIANGLE, from_upper_triangle, ldl, symmetric
 from supervessel.rotation.dynamics import Dynamics
+from supervessel.rotation.gravity import Field
 from supervessel.rotation.laws import LAWS, RotationLaw, gyroscopic_torque
 
 COSINE_STEPS = 4
@@ -138,6 +139,26 @@ class LeftOut:
 
 
 @dataclass(frozen=True)
+class GradientConstants:
+    """What the bound needs of a composite that gravity's gradient turns; torques are those of 3 mu/|r|^3 = 1.
+
+    coupling : k (J_max - J_min), where |e| <= k |e|_J: two attitudes an angle apart have torques that far
+               apart in the norm of J^-1, over the angle, [EB] eq. (43)
+    push     : |D^-1 torque| is at most that, D being the tensor of the law [1]
+    lift     : |torque| in the norm of D^-1 is at most that; 0 where the law has no gyroscopic term
+    left_out : linear map of products of r^ to L^-1 (J D^-1 torque by D - torque by J), (3, 6), [EB] eq. (45);
+               None of the law that leaves nothing out
+    bend     : rho with |left_out(a, b)| <= rho |a| |b|
+    """
+
+    coupling: ca.SX
+    push: ca.SX
+    lift: ca.SX
+    left_out: ca.SX | None
+    bend: ca.SX
+
+
+@dataclass(frozen=True)
 class BoundConstants:
     """What the bound needs of a composite, computed when that changes.
 
@@ -149,6 +170,7 @@ class BoundConstants:
     coupling  : g of [EB] eq. (23), at least LEAST_COUPLING
     lightness : Frobenius norm of the inverse of the law's own tensor [1/(kg m2)]
     heaviest  : Frobenius norm of J [kg m2]
+    gradient  : of gravity; None where there is no field
     """
 
     law: RotationLaw
@@ -159,6 +181,7 @@ class BoundConstants:
     coupling: ca.SX
     lightness: ca.SX
     heaviest: ca.SX
+    gradient: GradientConstants | None = None
 
 
 LEAST_COUPLING = 0.25
@@ -167,30 +190,60 @@ LEAST_COUPLING = 0.25
 
 def constants_of(dynamics: Dynamics) -> BoundConstants:
     """Returns what the bound needs of a scene's composite."""
-    return bound_constants(dynamics.law, dynamics.numbers, dynamics.inertia, dynamics.moving)
+    law, numbers, field = dynamics.law, dynamics.numbers, dynamics.field
+    return bound_constants(law, numbers, dynamics.inertia, dynamics.moving, field)
 
 
-def bound_constants(law: RotationLaw, numbers: ca.SX, inertia: ca.SX, spin: ca.SX | None) -> BoundConstants:
+def bound_constants(
+    law: RotationLaw, numbers: ca.SX, inertia: ca.SX, spin: ca.SX | None, field: Field | None = None
+) -> BoundConstants:
     """Returns what the bound needs of a composite.
 
     numbers : the law's own, of the tensor
     inertia : (3, 3) [kg m2]
     spin    : angular momentum of the parts that move in body axes, (3,) [N m s]; None where none moves
+    field   : of gravity, whose gradient turns the body; None where there is none
     """
     may_be_point = law is LAWS["none"]
     norm = norm_of(inertia, singular=may_be_point)
     own = law.turning(inertia) if law.gyroscopic_term else law.keeping(inertia)
     inverse = ca.SX.zeros(3, 3) if may_be_point else ca.inv_minor(own)
+    own_share = ca.sqrt(largest_eigenvalue(inverse)) if law.gyroscopic_term else ca.SX(0.0)
     return BoundConstants(
         law=law,
         numbers=numbers,
         norm=norm,
         left_out=None if law is LAWS["tensor"] else _left_out(law, numbers, norm, spin),
-        own_share=ca.sqrt(largest_eigenvalue(inverse)) if law.gyroscopic_term else ca.SX(0.0),
+        own_share=own_share,
         coupling=ca.fmax(_bilinear_norm(law.gyroscopic(numbers)), LEAST_COUPLING),
         lightness=ca.norm_fro(inverse),
         heaviest=ca.norm_fro(inertia),
+        gradient=None if field is None else _gradient(law, numbers, norm, own_share, field),
     )
+
+
+def _gradient(
+    law: RotationLaw, numbers: ca.SX, norm: EnergyNorm, own_share: ca.SX, field: Field
+) -> GradientConstants:
+    """Returns what the bound needs of a body in a field of gravity; own_share : see `BoundConstants`."""
+    own = field.gradient_map(law, numbers)
+    own = ca.horzcat(own, ca.SX.zeros(3, 6 - own.size2()))
+    left_out = None
+    if law is not LAWS["tensor"]:
+        left_out = ca.densify(norm.inverse @ (norm.inertia @ own + gyroscopic_torque(norm.inertia)))
+    return GradientConstants(
+        coupling=norm.rate_share * _spread(norm.inertia),
+        push=_bilinear_norm(own),
+        lift=own_share * (0.5 * _spread(field.inertia)),
+        left_out=left_out,
+        bend=ca.SX(0.0) if left_out is None else _bilinear_norm(left_out),
+    )
+
+
+def _spread(inertia: ca.SX) -> ca.SX:
+    """Returns the largest moment less the least one [kg m2], from above."""
+    deviator = inertia - (ca.trace(inertia) / 3.0) * ca.SX.eye(3)
+    return largest_of_traceless(deviator) + largest_of_traceless(-deviator)
 
 
 def _left_out(law: RotationLaw, numbers: ca.SX, norm: EnergyNorm, spin: ca.SX | None) -> LeftOut:
@@ -227,7 +280,13 @@ def stored(constants: BoundConstants) -> ca.SX:
         parts += [_elements(S, UPPER_TRIANGLE) for S in norm.turned]
     scalars = (norm.rate_share, norm.steepest)
     own = (constants.own_share, constants.coupling, constants.lightness, constants.heaviest)
-    return ca.vertcat(*parts, *scalars, *own)
+    gradient = constants.gradient
+    of_gradient: list[ca.SX] = []
+    if gradient is not None:
+        of_gradient = [gradient.coupling, gradient.push, gradient.lift]
+        if gradient.left_out is not None:
+            of_gradient += [ca.vec(gradient.left_out), gradient.bend]
+    return ca.vertcat(*parts, *scalars, *own, *of_gradient)
 
 
 def _elements(matrix: ca.SX, places: Sequence[tuple[int, int]]) -> ca.SX:
@@ -250,7 +309,7 @@ def restored(constants: BoundConstants, vector: ca.SX) -> BoundConstants:
         left_out = LeftOut(by_torque, by_rate, _matrix(elements, 6), next(elements))
         norm = replace(norm, turned=(_symmetric(elements), _symmetric(elements), _symmetric(elements)))
     norm = replace(norm, rate_share=next(elements), steepest=next(elements))
-    own_share, coupling, lightness, heaviest = elements
+    own_share, coupling, lightness, heaviest = (next(elements) for _ in range(4))
     return replace(
         constants,
         norm=norm,
@@ -259,7 +318,19 @@ def restored(constants: BoundConstants, vector: ca.SX) -> BoundConstants:
         coupling=coupling,
         lightness=lightness,
         heaviest=heaviest,
+        gradient=_restored_gradient(constants.gradient, elements),
     )
+
+
+def _restored_gradient(
+    gradient: GradientConstants | None, elements: Iterator[ca.SX]
+) -> GradientConstants | None:
+    if gradient is None:
+        return None
+    coupling, push, lift = (next(elements) for _ in range(3))
+    if gradient.left_out is None:
+        return replace(gradient, coupling=coupling, push=push, lift=lift)
+    return GradientConstants(coupling, push, lift, _matrix(elements, 6), next(elements))
 
 
 def _symmetric(elements: Iterator[ca.SX]) -> ca.SX:
