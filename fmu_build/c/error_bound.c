@@ -17,6 +17,8 @@ static const double PI = 3.14159265358979323846;
 
 enum { ANGLE, ENERGY, RATE, PLACE };
 
+enum { BOUND_COUNT = sizeof ((Dynamics *)0)->bound / sizeof(double) };
+
 static bool says_nothing(const Dynamics *now) {
     return !(now->bound[ANGLE] < PI);
 }
@@ -221,11 +223,11 @@ static bool carry(Instance *instance, const double x[], double size, const Progr
     composite_refresh_axes(instance);
     const double power = progress->was_free ? 0.0 : progress->exponent;
     const double s[4] = {size, power, progress->found[0], progress->found[1]};
-    const double sizes = sum_of_sizes(x + 4, 3) + sum_of_sizes(s, 4) + sum_of_sizes(now->bound, sizeof now->bound / sizeof *now->bound) +
+    const double sizes = sum_of_sizes(x + 4, 3) + sum_of_sizes(s, 4) + sum_of_sizes(now->bound, BOUND_COUNT) +
                          sum_of_sizes(&now->values[REFERENCE_TORQUE], INPUT_U_COUNT);
     const bool tame = now->constants_are_tame && sizes <= TAME_STEP;
     if (!tame && !(instance_is_ordinary(instance) && are_within(x, STATE_COUNT, ORDINARY))) return false;
-    double after[sizeof now->bound / sizeof *now->bound];
+    double after[BOUND_COUNT];
     instance_set_arguments(instance);
     instance->arg[0] = x;
 #if FIELD

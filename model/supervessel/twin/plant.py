@@ -233,13 +233,12 @@ class Plant:
 
         Proven for any h, up to rounding, which is allowed for; a long step gives a larger bound than many
         short ones, an infinite one where the remainder of "rk4", "taylor" or "dop853" is not known ("dop853":
-        beyond some 0.015 rad; in a field of gravity earlier, all after some seconds to a minute of a low orbit).
-        Of "exact" rounding alone is counted. It is large, and useless, where the
-        motion itself is sensitive: over tens of radians of a tumble. Where p changes between steps,
-        `error_bound_change` comes first. Not meant to be differentiated. Derivation, and what it rests on:
-        model/docs/error_bound.md.
-        Raises ValueError for "split", whose steps have no bound, for a scene with wheels, and for the law "none"
-        in a field of gravity.
+        beyond some 0.015 rad; in a field of gravity earlier, all after some seconds to a minute of a low
+        orbit). Of "exact" rounding alone is counted. It is large, and useless, where the motion itself is
+        sensitive: over tens of radians of a tumble. Where p changes between steps, `error_bound_change` comes
+        first. Not meant to be differentiated. Derivation, and what it rests on: model/docs/error_bound.md.
+        Raises ValueError for "split", whose steps have no bound, for a scene with wheels, and for the law
+        "none" in a field of gravity.
 
         Example:
             >>> bound = twin.error_bound(twin.x_start, [0, 0], [0, 0, 100], twin.p_start, 0.1)
