@@ -107,24 +107,17 @@ def by_reference(name: str, rows: list[dict[str, float]]) -> Array:
     y = np.array([*rotation.attitude, *rotation.angular_velocity, *(wheel.momentum for wheel in wheels)])
     for row in rows[:-1]:
         after = values | row
-        y[4:7] = reference.change(flying, y[4:7], values, after)
+        y[4:] = reference.change(flying, y[4:], values, after)
         values = after
         y = y + INTERVAL * rate_by_reference(flying, y, values)
     return y
 
 
 def rate_by_reference(flying: Scene, y: Array, values: dict[str, float]) -> Array:
-    """Returns the rate of the state; wheels are in the root vessel, along axes of unit length, and have no
-    inertia."""
-    wheels = [flying.wheel(name) for name in flying.wheels]
-    assert not any(wheel.inertia for wheel in wheels)
-    axes = np.array([wheel.axis for wheel in wheels]).reshape(-1, 3)
-    motors = np.array([values.get(f"{name}.torque", 0.0) for name in flying.wheels])
-    stored = reference.Wheels(axes, np.zeros(len(wheels)), y[7:], motors)
-    attitude = y[:4] / np.linalg.norm(y[:4])  # of any length by Euler's method
+    """Returns the rate of the state, (7 + n,), whose attitude is of any length by Euler's method."""
+    attitude = y[:4] / np.linalg.norm(y[:4])
     torque = reference.external_torque(flying, values) + reference.gradient_torque(flying, attitude, values)
-    torque = torque + stored.reaction - np.cross(y[4:7], stored.momentum)
-    return np.append(reference.ode(flying, y[:7], torque, values), motors)
+    return reference.ode(flying, y, torque, values)
 
 
 def apart(found: Array, right: Array) -> float:
