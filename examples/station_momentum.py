@@ -64,18 +64,18 @@ def orbital_rate(scene: Scene) -> Array:
     return np.cross(position, velocity) / (position @ position)
 
 
-def first_guess(x: Array, orbital: Array, times: Array, duration: float) -> Array:
-    """Returns states (10, N) that turn with the orbit from the state x, and empty the gyroscopes evenly."""
+def in_inertial_axes(attitudes: Array, orbital: Array, times: Array) -> Array:
+    """Returns attitudes (4, N) that are given (4, N) in axes that turn with the orbit, at times [s] (N,).
+
+    orbital : angular velocity of the orbit, (3,) [rad/s], inertial axes, which these axes are at time 0
+    """
     rate = np.linalg.norm(orbital)
-    normal, w, v = orbital / rate, x[0], x[1:4]
-    across = np.append(-normal @ v, w * normal + np.cross(normal, v))  # the product (0, normal) q
-    guess = np.outer(x, np.ones(len(times)))
-    guess[:4] = np.outer(x[:4], np.cos(rate * times / 2.0)) + np.outer(across, np.sin(rate * times / 2.0))
-    guess[7:] *= 1.0 - times / duration
-    return guess
+    normal, w, v = orbital / rate, attitudes[0], attitudes[1:]
+    across = np.vstack([-normal @ v, np.outer(normal, w) + np.cross(normal, v.T).T])  # (0, normal) q
+    return attitudes * np.cos(rate * times / 2.0) + across * np.sin(rate * times / 2.0)
 
 
-def collocation(duration: float) -> tuple[Array, ca.DM, ca.DM]:
+def collocation(duration: float, intervals: int) -> tuple[Array, ca.DM, ca.DM]:
     """Returns how states and torques at Radau's points stand for their course.
 
     times   : of the points [s], (N,), DEGREE in each interval; the last one is its end
@@ -85,11 +85,11 @@ def collocation(duration: float) -> tuple[Array, ca.DM, ca.DM]:
     """
     points = ca.collocation_points(DEGREE, "radau")
     inside, _, weights = ca.collocation_coeff(points)
-    rates = ca.DM(1 + INTERVALS * DEGREE, INTERVALS * DEGREE)
-    for k in range(0, INTERVALS * DEGREE, DEGREE):
+    rates = ca.DM(1 + intervals * DEGREE, intervals * DEGREE)
+    for k in range(0, intervals * DEGREE, DEGREE):
         rates[k : k + DEGREE + 1, k : k + DEGREE] = inside
-    times = (np.arange(INTERVALS)[:, None] + np.array(points)).ravel() * duration / INTERVALS
-    return times, rates, ca.repmat(weights, INTERVALS, 1)
+    times = (np.arange(intervals)[:, None] + np.array(points)).ravel() * duration / intervals
+    return times, rates, ca.repmat(weights, intervals, 1)
 
 
 def in_body_axes(attitude: ca.MX, vector: Array) -> ca.MX:
@@ -106,7 +106,7 @@ def optimise(scene: Scene) -> Plan:
     1, time to an interval.
     """
     twin, orbital, interval = Twin(scene), orbital_rate(scene), scene.experiment.duration / INTERVALS
-    times, rates, weights = collocation(scene.experiment.duration)
+    times, rates, weights = collocation(scene.experiment.duration, INTERVALS)
     rate, p = float(np.linalg.norm(orbital)), places(scene, times)
     scale = np.array([1.0] * 4 + [rate] * 3 + [MOST_MOMENTUM] * 3)
     opti = ca.Opti()
@@ -121,7 +121,10 @@ def optimise(scene: Scene) -> Plan:
     opti.subject_to(X[7:, -1] == 0)
     opti.subject_to((end[4:7] - in_body_axes(end[:4], orbital)) / rate == 0)
     opti.subject_to(twin.ode(end, ca.MX(3, 1), p[:, -1])[4:7] / rate**2 == 0)
-    guess = first_guess(twin.x_start, orbital, np.append(0.0, times), scene.experiment.duration)
+    passed = np.append(0.0, times)
+    guess = np.outer(twin.x_start, np.ones(len(passed)))
+    guess[:4] = in_inertial_axes(guess[:4], orbital, passed)
+    guess[7:] *= 1.0 - passed / scene.experiment.duration
     opti.set_initial(X, guess / scale[:, None])
     opti.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes", "tol": 1e-10})
     begun = perf_counter()
@@ -133,9 +136,9 @@ def optimise(scene: Scene) -> Plan:
 def torques_at(plan: Plan, times: Array) -> Array:
     """Returns the plan's torques at times [s] (n,), (n, 3) [N m]: of an interval the polynomial through its
     points."""
-    ends = plan.times.reshape(INTERVALS, DEGREE)
-    which = np.minimum((times / ends[0, -1]).astype(int), INTERVALS - 1)
-    points, torques = ends[which], plan.torques.reshape(INTERVALS, DEGREE, 3)[which]
+    ends = plan.times.reshape(-1, DEGREE)
+    which = np.minimum((times / ends[0, -1]).astype(int), len(ends) - 1)
+    points, torques = ends[which], plan.torques.reshape(-1, DEGREE, 3)[which]
     result = np.zeros((len(times), 3))
     for j in range(DEGREE):
         others = np.delete(points, j, axis=1)
@@ -147,11 +150,12 @@ def torques_at(plan: Plan, times: Array) -> Array:
 def fly(fmu: Path, scene: Scene, plan: Plan) -> tuple[Array, Array, Array]:
     """Returns times [s] (n,), torques [N m] (n, 3) and states (n, 10) of the FMU.
 
-    The torque of a step's middle is held over the step.
+    Over each step its mean torque is held: by Gauss's two points, exact for polynomials of degree 3. Errors
+    grow a thousandfold in an hour where gravity overturns a station.
     """
     step = scene.experiment.step
     times = np.arange(0.0, scene.experiment.duration + step / 2.0, step)
-    torques = torques_at(plan, times + step / 2.0)
+    torques = sum(torques_at(plan, times + step * share) for share in (0.5 - 12**-0.5, 0.5 + 12**-0.5)) / 2.0
     inputs = [f"{wheel}.torque" for wheel in WHEELS]
     inputs += [*elements("gravity.position", 3), *elements("gravity.velocity", 3)]
     course = np.rec.fromarrays([times, *torques.T, *places(scene, times)], names=["time", *inputs])
@@ -189,7 +193,7 @@ def main(folder: Path) -> None:
     )
     print("|---:|---:|---:|---:|---:|---:|")
     solved = f"{plan.cost:.5f} | {PUBLISHED} | {plan.iterations} | {plan.seconds:.1f}"
-    print(f"| {solved} | {left[0]:.2f} | {left[1]:.0e} |")
+    print(f"| {solved} | {left[0]:.0e} | {left[1]:.0e} |")
 
 
 if __name__ == "__main__":

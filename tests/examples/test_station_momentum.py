@@ -107,8 +107,8 @@ def test_the_fmu_lands_in_equilibrium_with_empty_gyroscopes(flown):
 
 
 def test_the_page_gives_these_figures(plan, flown):
-    momentum = np.abs(flown[2][-1, 7:]).max()
+    assert np.abs(flown[2][-1, 7:]).max() < 1e-6
     row = next(line for line in text("examples/README.md").splitlines() if "station_momentum.py" in line)
     assert f"{plan.cost:.5f}" in row
     assert f"{plan.iterations} iterations" in row
-    assert f"{momentum:.2f} N m s" in row
+    assert "ends with less than 1e-6" in row
