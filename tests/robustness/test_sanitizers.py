@@ -28,7 +28,7 @@ SUITE_TIME_LIMIT = 3600.0  # s; about ten minutes on two cores
 LIBRARIES = 100
 """The suite flies more of them; fewer would say that it flies others, without sanitizers."""
 PROPAGATORS = [(2, "rk4"), (3, "rk4"), (2, "auto"), (3, "auto"), (3, "split")]
-NAMES = ("moving", "mixed", "docks", "capture", "bounded", "orbiting", "gradient")
+NAMES = ("moving", "mixed", "docks", "capture", "bounded", "orbiting", "gradient", "spinning")
 SCENES = [(fmi, scene) for scene in NAMES for fmi in (2, 3)]
 BUILDS = pytest.mark.parametrize(("fmi", "propagator"), [*PROPAGATORS, *SCENES])
 """FMI version, and propagator of RAW or one of CHANGING."""
@@ -153,10 +153,19 @@ CHANGING = {
         },
     ),
     "gradient": variant(RAW, ORBIT | {"rotation.propagator": "taylor", "rotation.tolerance": 1e-3}),
+    "spinning": variant(
+        RAW,
+        {
+            "vessels.A.wheels": {"w": {"axis": [0.0, 1.0, 2.0], "inertia": 30.0, "momentum": 400.0}},
+            "inputs.wheel": ["A.w"],
+            "rotation.propagator": "taylor",
+            "rotation.tolerance": 1e-3,
+        },
+    ),
 }
 """Scenes with forces: a port moves and all changes keep momentum, or poses alone do; docks open and close
 beside, or two of them at one port by turns; the bound of a cheap law's error is carried along all that;
-wheels and gravity's gradient besides; and the gradient without these, by Taylor series."""
+wheels and gravity's gradient besides; and the gradient, and a wheel, without these, by Taylor series."""
 
 
 @cache
