@@ -20,6 +20,7 @@ from fmu_build.document.rotation_text import (
     law_equation,
     law_text,
     what_changes_keep,
+    wheels_text,
 )
 from fmu_build.document.tables import Cell, number_text, rounded, table
 from fmu_build.interface.model_description import role_attributes
@@ -50,6 +51,13 @@ NEAREST = (
     "of the trace of its inertia tensor over its mass; its inputs must be at most 1e100 long.</li>\n"
 )
 """What is refused of the place in a field of gravity, HTML."""
+
+OF_WHEELS = (
+    "<li>a vessel with wheels must have a mass &gt; 0; without what wheels have about their axes the tensor "
+    "of the whole must be positive definite too; while docks do not hold a wheel's vessel to the root, the "
+    "torque of its motor must be 0;</li>\n"
+)
+"""What is refused where there are wheels, HTML."""
 
 ROLE_TITLES: dict[Role, tuple[str, str]] = {
     "time": ("Independent variable", ""),
@@ -98,7 +106,7 @@ def page(
         variables=_variables(entries),
         law=escape(rotation.law),
         law_equation=law_equation(scene),
-        gravity=gradient_text(scene),
+        gravity=wheels_text(scene) + gradient_text(scene),
         moments=energy_and_momentum(scene),
         changes=what_changes_keep(scene),
         law_text=law_text(scene),
@@ -106,7 +114,7 @@ def page(
         propagator_text=description(scene),
         accuracy="" if evidence is None else accuracy_text(evidence),
         definite="" if rotation.law == "none" else " and positive definite",
-        nearest=NEAREST if gradient_text(scene) else "",
+        nearest=(OF_WHEELS if scene.wheels else "") + (NEAREST if gradient_text(scene) else ""),
         status=VERSIONS[fmi].refusal,
     )
 

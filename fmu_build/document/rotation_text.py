@@ -48,6 +48,18 @@ GRADIENT = (
 )
 """What the page says of gravity's gradient, HTML."""
 
+SUM = "\N{GREEK CAPITAL LETTER SIGMA}"
+
+WHEELS = (
+    "<p>Each wheel has an axis <i>b</i>, an inertia <i>I</i> about it, which is part of <i>J</i>, a momentum "
+    f"<i>k</i> along it, and a motor that turns it by the torque <i>u</i>, so that <i>k</i>{PRIME} = "
+    "<i>u</i>. In the law above, and in energy and momentum below, "
+    f"<i>J</i> {MINUS} {SUM} <i>I b b</i><sup>T</sup> stands in place of <i>J</i>, "
+    f"<i>M</i> {MINUS} {SUM} <i>u b</i> in place of <i>M</i> and, but for the energy, "
+    f"<i>J ω</i> + {SUM} <i>k b</i> in place of <i>J ω</i>. The energy of wheels is left out.</p>\n"
+)
+"""What the page says of wheels, HTML."""
+
 DIAGONAL = "\n<p><i>J</i> is the diagonal there too, as the law has it.</p>"
 
 KEPT_BY = {
@@ -97,6 +109,11 @@ def gradient_text(scene: Scene) -> str:
     if scene.gravity is None or scene.rotation.law == "none":
         return ""
     return GRADIENT + (DIAGONAL if scene.rotation.law != "tensor" else "") + "\n"
+
+
+def wheels_text(scene: Scene) -> str:
+    """Returns how wheels enter the equations, or "" without wheels."""
+    return WHEELS if scene.wheels else ""
 
 
 def energy_and_momentum(scene: Scene) -> str:

@@ -340,6 +340,8 @@ def test_the_page_lists_wheels():
     table = page[page.index("Wheels, part of") :].split("</table>")[0]
     rows = [re.findall(r"<td[^>]*>(.*?)</td>", row) for row in table.split("</tr>")]
     assert ["B.y", "0, 1, 1", "1", "3", "yes"] in rows
+    assert "<i>k</i>′ = <i>u</i>" in page
+    assert "the torque of its motor must be 0" in " ".join(page.split())
 
 
 def test_what_changes_with_a_motor_is_its_wheels_momentum_and_the_bodys_rate():
