@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from supervessel import load_scene
+from supervessel.scene.names import MOST_WHEELS
 from supervessel.scene.writing import scene_text
 from support import scene, variant
 from support.refusals import problems
@@ -96,6 +97,14 @@ def test_accuracy_and_orbiters_convention_know_no_wheels():
 def test_the_parts_of_a_vessel_never_share_a_name(part, table, message):
     raw = variant(GYROSTAT, {f"vessels.B.{part}": {"x": table}})
     assert problems(raw) == [f'vessels.B.wheels: name "x" is that of a {message} of B']
+
+
+def test_a_scene_of_more_wheels_than_can_be_read_in_seconds_is_refused():
+    many = {f"w{i}": {"axis": [1, 0, 0]} for i in range(MOST_WHEELS + 1)}
+    raw = variant(GYROSTAT, {"vessels.B.wheels": many})
+    assert problems(raw) == [
+        f"wheels of all vessels: {len(many)} of them; at most {MOST_WHEELS} are possible"
+    ]
 
 
 @pytest.mark.parametrize("name", ["torque", "state", "gravity"])

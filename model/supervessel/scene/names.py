@@ -23,8 +23,9 @@ DEVICE = re.compile(r"(con|prn|aux|nul|(com|lpt)[0-9])", re.IGNORECASE)
 MOST_VESSELS = 2000
 MOST_MOVING = 1000
 MOST_LISTED = 2000
-"""Most vessels of a scene, most inputs that move or close docks, most names in any other list of inputs: a
-scene within these limits is read in seconds."""
+MOST_WHEELS = 1000
+"""Most vessels of a scene, most inputs that move or close docks, most names in any other list of inputs, most
+wheels: a scene within these limits is read in seconds."""
 
 Ports = Mapping[str, Collection[str]]
 """By vessel, the names of its ports, of its points, or of its wheels."""
@@ -56,8 +57,11 @@ def size_problems(raw: Mapping[str, Any]) -> Iterator[str]:
     moving = "inputs.pose and inputs.docked"
     counts = {"vessels": len(_table(raw, "vessels")), **lists}
     counts[moving] = lists.get("inputs.pose", 0) + lists.get("inputs.docked", 0)
+    wheels = "wheels of all vessels"
+    counts[wheels] = sum(map(len, _parts(raw, "wheels").values()))
+    limits = {"vessels": MOST_VESSELS, moving: MOST_MOVING, wheels: MOST_WHEELS}
     for place, count in counts.items():
-        most = {"vessels": MOST_VESSELS, moving: MOST_MOVING}.get(place, MOST_LISTED)
+        most = limits.get(place, MOST_LISTED)
         if count > most:
             yield f"{printable(place)}: {count} of them; at most {most} are possible"
 
