@@ -21,13 +21,14 @@ from supervessel import reference
 from supervessel.composite.inertia import from_upper_triangle
 from supervessel.orbit import two_body
 from supervessel.rotation.attitude import attitude_dot
-from supervessel.rotation.error_bound.carried import TurnedBody
-from supervessel.rotation.error_bound.centre_motion import centre_motion
+from supervessel.rotation.error_bound.carried import TurnedBody, largest_residual, motion_bounds
+from supervessel.rotation.error_bound.centre_motion import centre_motion, place_after
 from supervessel.rotation.error_bound.constants import bound_constants
 from supervessel.rotation.error_bound.functions import bound_after_step
 from supervessel.rotation.error_bound.remainder import (
     GUESSES,
     ORBIT_DEPTH,
+    place_error,
     remainder_of,
     step_error,
 )
@@ -46,8 +47,9 @@ TRUTH = 1e-9  # of SciPy at rtol 1e-12 over turns of some radians, which grow an
 
 @cache
 def flown_function(law: str, method: str) -> ca.Function:
-    """Returns x and place, bound, J, M, step -> those a step later, bound_next, what the step adds.
+    """Returns x and place, bound, J, M, step -> those a step later, bound_next, what the step adds, place's.
 
+    bound : (3,), angle, energy norm, error of the place; the last one's end is the last result
     mu is 1: a circular orbit of radius 1 has the rate 1.
     """
     rules = LAWS[law]
@@ -69,8 +71,13 @@ def flown_function(law: str, method: str) -> ca.Function:
     body = TurnedBody(J, M, ca.SX.zeros(3), field)
     constants = bound_constants(rules, numbers, J, None, field)
     found = bound_after_step(constants, body, x[:7], h, bound)
-    off = step_error(remainder_of(method, ORDER, in_orbit=True), constants, body, found.motion)
-    return ca.Function("flown", [x, bound, six, M, h], [stepped[method](), found.bound + off, off])
+    remainder = remainder_of(method, ORDER, in_orbit=True)
+    off = step_error(remainder, constants, body, found.motion)
+    centre = found.motion.centre
+    assert centre is not None
+    place = place_after(centre, found.place, place_error(remainder, found.motion, None))
+    results = [stepped[method](), found.bound + off, off, place]
+    return ca.Function("flown", [x, bound, six, M, h], results)
 
 
 def rate_of(law: str, J: Array, torque: Array) -> Callable[[float, Array], Array]:
@@ -95,6 +102,79 @@ def followed(law: str, J: Array, x: Array, torque: Array, span: float) -> Array:
     return np.asarray(found.y[:, -1])
 
 
+@cache
+def suprema_function(law: str) -> ca.Function:
+    """Returns x and place, J, M, step -> largest residual, reach, fastest and away."""
+    rules = LAWS[law]
+    x, six, M, h = (ca.SX.sym(*s) for s in (("x", 13), ("J", 6), ("M", 3), ("h",)))
+    J = from_upper_triangle(six)
+    field, numbers = Field(1.0, rules.keeping(J), x[7:]), rules.prepare(J)
+    constants = bound_constants(rules, numbers, J, None, field)
+    body = TurnedBody(J, M, ca.SX.zeros(3), field)
+    motion = motion_bounds(constants, body, x[4:7], h, centre_motion(field, x[:4], h))
+    results = [largest_residual(constants, body, motion), motion.reach, motion.fastest, motion.away]
+    return ca.Function("suprema", [x, six, M, h], results)
+
+
+@pytest.mark.parametrize("span", [0.02, 0.3])
+@pytest.mark.parametrize("law", ["decoupled", "principal", "tensor"])
+def test_suprema_hold_at_every_moment_of_a_step(law: str, span: float) -> None:
+    """[EB] eqs. (44) to (46), (51) to (53): samples of the law's motion, half of them from rest."""
+    random = np.random.default_rng(11)
+    tight = 0.0
+    for number in range(12):
+        J = random_tensor(random, "general")
+        w = random.normal(size=3) * (number % 2)
+        x = np.array([*random.normal(size=4), *w, *random_orbit(random)])
+        x[:4] /= np.linalg.norm(x[:4])
+        torque = J @ (0.3 * random.normal(size=3)) * (number % 3 == 0)
+        bounds = np.ravel(called(suprema_function(law), x, six_of(J), torque, span))
+        times, inverse = np.linspace(0.0, span, 12), np.linalg.inv(np.linalg.cholesky(J))
+        rate, true = rate_of(law, J, torque), rate_of("tensor", J, torque)
+        flown = solve_ivp(rate, (0.0, span), x, "DOP853", times, rtol=1e-11, atol=1e-12).y.T
+        for each in flown:
+            a = rate(0.0, each)[4:7]
+            unbalanced = J @ (a - true(0.0, each)[4:7])
+            found = [np.linalg.norm(v) for v in (inverse @ unbalanced, each[4:7], a, each[4:7] - x[4:7])]
+            if law == "tensor":
+                found[0] = 0.0
+            assert np.all(np.array(found) <= bounds + 1e-8)
+            tight = max(tight, found[3] / bounds[3])
+    print(law, span, tight)
+    assert tight > 0.3
+
+
+def test_a_place_that_is_off_is_followed() -> None:
+    """[EB] eq. (54): under the law "tensor", whose only error comes from a place that is not the true one."""
+    random, share = np.random.default_rng(12), 0.0
+    for _ in range(12):
+        J = random_tensor(random, "general")
+        true = np.array([1.0, 0.0, 0.0, 0.0, *(0.5 * random.normal(size=3)), *random_orbit(random)])
+        x = true.copy()
+        d = np.linalg.norm(x[7:10])
+        size = 10.0 ** random.uniform(-6.0, -3.0)
+        aside = random.normal(size=6)
+        x[7:] += size * aside * np.repeat([d, d**-0.5], 3)
+        d = np.linalg.norm(x[7:10])
+        off = x[7:] - true[7:]
+        bound = np.array([0.0, 0.0, max(np.linalg.norm(off[:3]) / d, np.linalg.norm(off[3:]) * d**0.5)])
+        for _ in range(30):
+            x, found, _, place = called(
+                flown_function("tensor", "rk4"), x, bound, six_of(J), np.zeros(3), 0.01
+            )
+            bound = np.append(found, place)
+        right = followed("tensor", J, true, np.zeros(3), 0.3)
+        d = np.linalg.norm(x[7:10])
+        off = x[7:] - right[7:]
+        error = max(np.linalg.norm(off[:3]) / d, np.linalg.norm(off[3:]) * d**0.5)
+        angle, energy = angle_between(x[:4], right[:4]), energy_norm(J, x[4:7] - right[4:7])
+        assert error <= bound[2]
+        assert angle <= bound[0]
+        assert energy <= bound[1]
+        share = max(share, energy / bound[1], error / bound[2])
+    assert share > 0.1
+
+
 @pytest.mark.parametrize("law", ["principal", "tensor"])
 @pytest.mark.parametrize(("method", "size"), [("rk4", 0.02), ("taylor", 0.01), ("dop853", 0.0003)])
 def test_remainder_is_never_exceeded_by_a_step(law: str, method: str, size: float) -> None:
@@ -105,7 +185,7 @@ def test_remainder_is_never_exceeded_by_a_step(law: str, method: str, size: floa
         J = random_tensor(random, "general")
         x = np.array([*random.normal(size=4), *random.normal(size=3), *random_orbit(random)])
         x[:4] /= np.linalg.norm(x[:4])
-        end, _, parts = called(flown_function(law, method), x, np.zeros(3), six_of(J), np.zeros(3), size)
+        end, _, parts, _ = called(flown_function(law, method), x, np.zeros(3), six_of(J), np.zeros(3), size)
         right = followed(law, J, x, np.zeros(3), size)
         angle, rate = angle_between(end[:4], right[:4]), energy_norm(J, end[4:7] - right[4:7])
         within += bool(np.isfinite(parts[0]))
@@ -209,7 +289,7 @@ def test_bound_is_never_exceeded_along_random_flights(law: str) -> None:
         torque = J @ (0.1 * random.normal(size=3) * (number % 3 == 0))
         for _ in range(4):
             for _ in range(20):
-                x, bound, _ = called(flown_function(law, "rk4"), x, bound, six_of(J), torque, 0.01)
+                x, bound, *_ = called(flown_function(law, "rk4"), x, bound, six_of(J), torque, 0.01)
                 bound = np.append(bound, 0.0)
             true = followed("tensor", J, true, torque, 0.2)
             angle, energy = angle_between(x[:4], true[:4]), energy_norm(J, x[4:7] - true[4:7])
