@@ -139,7 +139,7 @@ def test_functions_stay_casadis_own(twin: Twin, tmp_path: Path) -> None:
     assert numbers(text(*at)).tolist() == numbers(twin.step(*at)).tolist()
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
+@pytest.mark.parametrize("name", [name for name in FUNCTIONS if name != "trim_by_wheels"])
 def test_each_function_survives_saving(twin: Twin, name: str) -> None:
     function = getattr(twin, name)
     again = ca.Function.deserialize(function.serialize())

@@ -16,6 +16,7 @@ from supervessel.problems import unknown
 from supervessel.rotation.attitude import to_inertial, unit
 from supervessel.rotation.dynamics import Dynamics, dynamics_of
 from supervessel.rotation.principal import principal
+from supervessel.scene.inputs import WHEEL_TORQUE
 from supervessel.twin.conventions import acados_model, do_mpc_model
 from supervessel.twin.error_state import error_rate, retracted, state_error
 from supervessel.twin.functions import TwinFunction
@@ -37,6 +38,7 @@ FUNCTIONS = (
     "linearise",
     "discretise",
     "trim",
+    "trim_by_wheels",
     "principal",
     "invariants",
 )
@@ -213,13 +215,43 @@ class Twin(Plant):
             True
         """
         self.check_torque("trim")
+        u = ca.vertcat(self._holding_torque, ca.SX.zeros(len(self.u_names) - 3))
+        return self._function("trim", {"x": self.x, "p": self.p}, {"u": u})
+
+    @cached_property
+    def trim_by_wheels(self) -> TwinFunction:
+        """x, p -> u, (m,), whose motors keep the angular velocity of x constant; all else in u is zero.
+
+        It is the torque of `trim`, exerted by the motors; of all that do it those whose squares add up to the
+        least. The wheels take up what the body does not: it holds for the x it is asked for, and along a
+        flight it is asked again. NaN while docks do not hold motors on three axes to the root. Raises
+        ValueError for a scene with fewer than three motors, or all of them in one plane.
+
+        Example:
+            >>> crewed = Twin(load_scene("examples/station_momentum.toml"))
+            >>> u = crewed.trim_by_wheels(crewed.x_start, crewed.p_start)
+            >>> float(ca.norm_inf(crewed.ode(crewed.x_start, u, crewed.p_start)[4:7])) < 1e-18
+            True
+        """
+        motors = [i for i, variable in enumerate(self.u_variables) if variable.kind is WHEEL_TORQUE]
+        wheels, known = self._dynamics.wheels, list(self.scene.wheels)
+        places = [known.index(self.u_variables[i].owner) for i in motors]
+        axes = ca.SX(3, 0) if wheels is None else wheels.axes.axes[:, places]
+        square = axes @ axes.T
+        if len(motors) < 3 or (square.is_constant() and np.linalg.matrix_rank(ca.DM(square).full()) < 3):
+            said = f'trim_by_wheels: scene "{self.scene.name}" has motors of {len(motors)} wheels'
+            raise ValueError(f"{said}: must be three or more, on axes that are not in one plane")
+        u = ca.SX.zeros(len(self.u_names))
+        u[motors] = -axes.T @ (ca.inv_minor(square) @ self._holding_torque)
+        return self._function("trim_by_wheels", {"x": self.x, "p": self.p}, {"u": u})
+
+    @property
+    def _holding_torque(self) -> ca.SX:
+        """The torque, (3,) [N m], body axes, that keeps the angular velocity of x constant."""
         omega = self.x[4:7]
         torque = ca.cross(omega, self._turning @ omega + self._spin)
         field = self._dynamics.field
-        if field is not None:
-            torque = torque - field.torque(self.x[:4], self._place[:3])
-        u = ca.vertcat(torque, ca.SX.zeros(len(self.u_names) - 3))
-        return self._function("trim", {"x": self.x, "p": self.p}, {"u": u})
+        return torque if field is None else torque - field.torque(self.x[:4], self._place[:3])
 
     @cached_property
     def principal(self) -> TwinFunction:
