@@ -228,6 +228,7 @@ class Twin(Plant):
         ValueError for a scene with fewer than three motors, or all of them in one plane.
 
         Example:
+            >>> from supervessel import Twin, load_scene
             >>> crewed = Twin(load_scene("examples/station_momentum.toml"))
             >>> u = crewed.trim_by_wheels(crewed.x_start, crewed.p_start)
             >>> float(ca.norm_inf(crewed.ode(crewed.x_start, u, crewed.p_start)[4:7])) < 1e-18
