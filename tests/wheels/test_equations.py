@@ -228,6 +228,35 @@ def test_rk4_is_as_fine_as_the_momentum_of_wheels_asks_for():
     assert 50.0 * pushed / 6.0 * pushed <= of.scene.rotation.max_angle_step
 
 
+@pytest.mark.parametrize("angle", [0.05, 1.0])
+@pytest.mark.parametrize(
+    ("law", "turn"), [("tensor", [[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]]), ("principal", np.eye(3))]
+)
+def test_a_sub_step_of_rk4_turns_no_further_where_a_wheel_leaves_little_about_an_axis(angle, law, turn):
+    # Less its wheel the body has moments that no rigid body has: its rate grows 80 times as fast by them.
+    K, turn = np.diag([0.1, 12.0, 20.0]), np.array(turn)
+    raw = variant(
+        GYROSTAT,
+        {
+            "vessels.B.inertia": (turn @ (K + np.diag([9.9, 0.0, 0.0])) @ turn.T).tolist(),
+            "vessels.B.wheels": {"x": {"axis": turn[:, 0].tolist(), "inertia": 9.9}},
+            "inputs": {"wheel": ["B.x"]},
+            "rotation": {"law": law, "propagator": "rk4", "max_angle_step": angle},
+            "rotation.angular_velocity": (turn @ [-0.1, 0.1, 0.1]).tolist(),
+            "outputs.names": ["attitude"],
+        },
+    )
+    of = Twin(scene(raw))
+    h = float(of.longest_step(of.x_start, [0.0], []))
+
+    def rate(_: float, state: Array) -> Array:
+        omega = state[:3]
+        return np.append(np.linalg.solve(K, -np.cross(omega, K @ omega)), np.linalg.norm(omega))
+
+    turned = solve_ivp(rate, (0.0, h), [-0.1, 0.1, 0.1, 0.0], rtol=1e-10, atol=1e-13).y[3, -1]
+    assert 0.005 * angle <= turned <= angle
+
+
 def test_principal_axes_are_those_of_the_tensor_without_wheels():
     K = np.array(INERTIA) - (AXES.T * INERTIAS) @ AXES
     moments, axes = (np.array(part) for part in twin().principal([]))

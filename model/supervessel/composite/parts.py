@@ -21,7 +21,7 @@ from supervessel.composite.wheels import (
     without_locked,
 )
 from supervessel.layout import slices_of, stacked
-from supervessel.rotation.laws import LAWS
+from supervessel.rotation.laws import LAWS, growth_excess
 from supervessel.scene.numbers import EPSILON
 from supervessel.scene.reuse import reused
 from supervessel.scene.schema import Scene
@@ -89,6 +89,7 @@ def composite_parts(resolved: ResolvedScene, p: ca.SX) -> dict[str, ca.SX]:
                     move relative to body axes; and the square, [rad2/s2], of |h| trace((J - A)^-1), which
                     bounds |(J - A)^-1 (omega x h)|/|omega|
     lightness     : (1,) [1/(kg m2)], where there are wheels: trace((J - A)^-1)
+    excess        : (1,), where there are wheels, see `growth_excess`
     wheels, wheel_rates : see `composite.wheels.wheel_parts`
     moment, force : see `composite.actions.action_parts`
     .NAME         : of the vessel NAME, see `composite.actions.vessel_parts`
@@ -122,6 +123,7 @@ def body_parts(scene: Scene, body: Body, wheels: WheelAxes | None = None) -> dic
         bound = ca.SX(0.0) if may_be_point else ca.trace(ldl_inverse(lower, pivots))
     if wheels is not None:
         parts["lightness"] = bound
+        parts["excess"] = growth_excess(LAWS[law], turning)
     if body.spin is not None:
         parts["momentum"] = ca.vertcat(body.spin, ca.sumsqr(body.spin) * bound * bound)
     return {name: ca.densify(part) for name, part in parts.items()}

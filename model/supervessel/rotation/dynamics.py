@@ -28,12 +28,14 @@ class SpunWheels:
     motors    : torque u_w of each wheel's motor, (n,) [N m]
     rate      : h_w' of each wheel, (n,) [N m]
     lightness : trace((J - A)^-1) [1/(kg m2)]
+    excess    : by how much d|omega|/dt over |omega|^2 may exceed the law's `growth`, see `composite.parts`
     """
 
     axes: WheelAxes
     motors: ca.SX
     rate: ca.SX
     lightness: ca.SX
+    excess: ca.SX
 
     @property
     def reaction(self) -> ca.SX:
@@ -185,4 +187,4 @@ def _wheels(resolved: ResolvedScene, parts: Mapping[str, ca.SX], u: ca.SX) -> Sp
     if axes is None:
         return None
     motors = motor_torques(resolved, u)
-    return SpunWheels(axes, motors, stored_rate(resolved, axes, motors), parts["lightness"])
+    return SpunWheels(axes, motors, stored_rate(resolved, axes, motors), parts["lightness"], parts["excess"])

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import casadi as ca
 
 from supervessel.composite.inertia import from_upper_triangle, ldl, ldl_inverse, upper_triangle
+from supervessel.rotation.lengths import smooth_length
 
 if TYPE_CHECKING:
     from supervessel.scene.schema import Law
@@ -179,6 +180,24 @@ def principal_products(moments: ca.SX) -> ca.SX:
     lightest axis. Here nothing is inverted.
     """
     return ca.vertcat(*((moments[i - 2] - moments[i - 1]) / moments[i] for i in range(3)))
+
+
+def growth_excess(law: RotationLaw, inertia: ca.SX) -> ca.SX:
+    """Returns by how much d|omega|/dt over |omega|^2 may exceed a law's `growth` without torque, >= 0.
+
+    inertia : (3, 3) [kg m2], positive definite; its moments may break the triangle inequality, as those of a
+              body less its wheels' inertia about their axes can
+    As for GYROSCOPIC_GROWTH, but with |a_1 a_2 a_3| = |(J_1 - J_2)(J_2 - J_3)(J_3 - J_1)|/det J, whose
+    numerator is the root of 4 s^3 - 27 det(S)^2: S is J less its mean moment, s half the sum of the squares
+    of its elements. Left out is the second term.
+    """
+    if not law.gyroscopic_term:
+        return ca.SX(0.0)
+    kept = ca.densify(law.keeping(inertia))
+    mean, (_, pivots) = ca.trace(kept) / 3.0, ldl(kept)
+    unlike = smooth_length(ca.vec(kept / mean - ca.SX.eye(3))) * (mean / sqrt(2.0))
+    growth = 2.0 * GYROSCOPIC_GROWTH * (unlike / pivots[0]) * (unlike / pivots[1]) * (unlike / pivots[2])
+    return ca.fmax(growth - law.growth, 0.0)
 
 
 LAWS: "dict[Law, RotationLaw]" = {

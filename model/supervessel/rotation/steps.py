@@ -10,7 +10,7 @@ from supervessel.rotation.dynamics import Dynamics, SpunWheels
 from supervessel.rotation.error_bound.remainder import has_sure_remainder
 from supervessel.rotation.lengths import smooth_length, smooth_root
 from supervessel.rotation.propagators import PROPAGATORS, Plan
-from supervessel.rotation.propagators.bound import fastest_square, longest_step
+from supervessel.rotation.propagators.bound import fastest_square, longest_step, stretched
 from supervessel.rotation.propagators.exact import free_functions, free_functions_of_start
 from supervessel.rotation.propagators.method import Step, StepSymbols
 from supervessel.rotation.rounding import turned_by_rounding
@@ -133,10 +133,14 @@ def _fastest_square(
     by_torque = length(motion.acceleration_by_torque)
     turning = motion.state if field is None else motion.state[: -field.start.numel()]
     held = dynamics.held_square(turning, angle, length)
-    if field is None:
-        return fastest_square(omega, by_torque, motion.law.growth, angle, held)
-    pushed = by_torque + field.largest_acceleration(motion.law, motion.numbers)
+    pushed = by_torque
+    if field is not None:
+        pushed = by_torque + field.largest_acceleration(motion.law, motion.numbers)
     square = fastest_square(omega, pushed, motion.law.growth, angle, held)
+    if dynamics.wheels is not None:
+        square = square * stretched(dynamics.wheels.excess, angle)
+    if field is None:
+        return square
     orbit = field.orbit_rate()
     return square + orbit * (orbit + 2.0 * smooth_root(square))
 

@@ -34,6 +34,20 @@ def fastest_square(
     return e * ca.sumsqr(angular_velocity) + 2.0 * f * by_torque
 
 
+def stretched(excess: ca.SX, angle: float) -> ca.SX:
+    """Returns by what `fastest_square` of a spin is to be multiplied where g is larger than `growth`.
+
+    excess : by how much, at least 0
+    angle  : s, [rad]
+    With a spin, d(w^2)/ds <= (2 g + 1) w^2 + b^2 + 2 a. With an excess d let the bound be the rate at the end
+    of the angle s/m alone, m = 1 + 2 d s, and m times that: so the step stays as short. Since 2 d s/m is at
+    most log m, and at most 1, e is then at most m times, and at most exp(1) times, what it is at s without
+    the excess, and f is no larger.
+    """
+    m = 1.0 + 2.0 * angle * excess
+    return m * m * ca.fmin(m, exp(1.0))
+
+
 def longest_step(rate_square: ca.SX, angle: float) -> ca.SX:
     """Returns angle over a rate [s], given by its square: infinite, with derivatives 0, where it is 0."""
     moves = rate_square > 0.0
