@@ -1,10 +1,12 @@
 """Reading scene files: every problem of a scene is found and named before anything is built from it."""
 
 from collections.abc import Mapping
+from math import hypot, sqrt
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from supervessel.composite.docks import TooManyWaysError
@@ -17,6 +19,9 @@ from supervessel.scene.names import misnamed_courses, naming_problems, size_prob
 from supervessel.scene.schema import Scene, known_keys
 from supervessel.scene.variables import InputVariable
 from supervessel.shell.reading import ReadingError, read_toml
+
+LARGEST_PLACE = 1e100
+"""[m], [m/s]: squares and cubes of components up to this are doubles."""
 
 EXPECTED = {
     "dict_type": "a table",
@@ -156,8 +161,29 @@ def _composite_problems(scene: Scene) -> list[str]:
         return ["vessels: masses, positions or moments are too large: the composite's inertia is not finite"]
     law = scene.rotation.law
     if law == "none" or (np.all(c["margins"] > 0.0) and np.all(np.isfinite(c["law"]))):
-        return []
+        return _place_problems(scene, c)
     three = ", ".join(f"{moment:.10g}" for moment in principal_moments(turning_at_start(scene, c)))
     allowed = f'must be positive beyond rounding for rotation.law = "{law}"'
     without = " without what its wheels have about their axes" if scene.wheels else ""
     return [f"vessels: the composite{without} has principal moments {three} kg m2: {allowed}"]
+
+
+def _place_problems(scene: Scene, c: Mapping[str, NDArray[np.float64]]) -> list[str]:
+    """Returns why the barycentre cannot start where it does in the field of gravity; the FMU judges likewise.
+
+    c : from `composite_at_start`
+    """
+    if scene.gravity is None or _orbit_problems(scene):
+        return []
+    table = "experiment.orbit" if scene.experiment and scene.experiment.orbit else "gravity"
+    starts = zip(("position", "velocity"), scene.gravity_start, ("m", "m/s"), strict=True)
+    problems = [
+        f"{table}.{key} = {quantity(start, unit)}: must be at most {LARGEST_PLACE:g} {unit} long"
+        for key, start, unit in starts
+        if max(map(abs, start)) > LARGEST_PLACE
+    ]
+    nearest, position = 2.0 * sqrt(float(c["pmi"].sum())), scene.gravity_start[0]
+    if not problems and not hypot(*position) > nearest:
+        allowed = f"must be more than twice the assembly's size, {nearest:.6g} m long"
+        problems.append(f"{table}.position = {quantity(position, 'm')}: {allowed}")
+    return problems

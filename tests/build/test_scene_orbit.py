@@ -93,6 +93,44 @@ def test_what_contradicts_itself_is_refused(changes, problems):
     assert list(caught.value.problems) == problems
 
 
+def test_a_place_that_has_no_meaning_at_the_start_is_refused():
+    ball = {
+        "name": "ball",
+        "root": "B",
+        "vessels": {"B": {"mass": 1000.0, "pmi": [1.0, 1.0, 1.0]}},
+        "inputs": {"gravity": True},
+        "gravity": {"mu": EARTH, "position": [3.4, 0.7, 0.0], "velocity": [0.0, 7000.0, 0.0]},
+    }
+    near = "m: must be more than twice the assembly's size, 3.4641 m long"
+    for changes, expected in (
+        ({"gravity.position": [3.4, 0.0, 0.0]}, [f"gravity.position = [3.4, 0.0, 0.0] {near}"]),
+        ({"gravity.position": [0.0, 0.0, 0.0]}, [f"gravity.position = [0.0, 0.0, 0.0] {near}"]),
+        (
+            {"gravity.velocity": [0.0, -1e101, 0.0]},
+            ["gravity.velocity = [0.0, -1e+101, 0.0] m/s: must be at most 1e+100 m/s long"],
+        ),
+        (
+            {"gravity.position": [0.0, 0.0, 1e200]},
+            ["gravity.position = [0.0, 0.0, 1e+200] m: must be at most 1e+100 m long"],
+        ),
+        (
+            {
+                "gravity": {"mu": 1.0},
+                "experiment": {
+                    "duration": 1.0,
+                    "step": 1.0,
+                    "orbit": {"position": [1.0, 0.0, 0.0], "velocity": [0.0, 1.0, 0.0]},
+                },
+            },
+            [f"experiment.orbit.position = [1.0, 0.0, 0.0] {near}"],
+        ),
+    ):
+        with pytest.raises(SceneError) as caught:
+            parse_scene(variant(ball, changes))
+        assert list(caught.value.problems) == expected
+    assert parse_scene(ball).gravity
+
+
 def test_an_accuracy_needs_the_orbit():
     accuracy = {"attitude": 1e-3, "horizon": 10.0, "step": 1.0}
     raw = orbiting({"gravity": HERE, "experiment": None, "accuracy": accuracy})
