@@ -6,9 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from fmu.bounds import apart
+from model.test_error_bound_gravity import rate_of
 from supervessel import SceneError, Twin
+from supervessel.orbit import two_body
 from support import OK, Array, Instance, flying, scene, variant
 from support.gyrostat import Course, Gyrostat, GyrostatState
 from support.orbits import EARTH, ORBIT
@@ -80,6 +83,59 @@ def test_the_true_motion_is_within_it(flight, largest):
                 assert error <= bound
     print(law, propagator, step, f"error {error:.2e}, bound {bound:.2e}")
     assert bound < largest
+
+
+def random_flight(random: np.random.Generator) -> tuple[Array, Array, float]:
+    """Returns a state, (7,), places at four communication points, (4, 6), and the step between them [s].
+
+    The body turns with a tenth to thirty times the orbit's rate; every orbit is another ellipse.
+    """
+    attitude, rate = random.normal(size=4), 1.1e-3 * random.normal(size=3)
+    state = np.append(attitude / np.linalg.norm(attitude), rate * 10.0 ** random.uniform(-1.0, 1.5))
+    position, velocity = np.array(ORBIT["position"]), random.uniform(0.7, 1.3) * np.array(ORBIT["velocity"])
+    step = float(random.choice([20.0, 60.0, 200.0, 600.0]))
+    return state, np.hstack(two_body(position, velocity, EARTH, step * np.arange(4.0))), step
+
+
+def by_scipy(state: Array, orbit: Array, step: float) -> Array:
+    """Returns the true state, (7,), a step later, by SciPy's DOP853."""
+    rate = rate_of("tensor", np.array(TENSOR), np.zeros(3), EARTH)
+    start = np.append(state, orbit)
+    return np.asarray(solve_ivp(rate, (0.0, step), start, "DOP853", rtol=1e-12, atol=1e-14).y[:7, -1])
+
+
+ROUGH = {
+    "taylor": {"tolerance": 1e-1},
+    "dop853": {"tolerance": 1e-2},
+    "rk4": {"max_angle_step": 0.5},
+    "split": {"tolerance": 1e-2},
+}
+SCIPY = 1e-9
+"""rad: more than SciPy at rtol 1e-12 and at 1e-13 differ by after four such steps."""
+
+
+@pytest.mark.parametrize("propagator", ROUGH)
+def test_rough_steps_are_within_what_their_estimates_make_of_it(propagator):
+    """Where nothing is proven: from random attitudes and rates, along random orbits."""
+    random, told, largest, share = np.random.default_rng(7), 0, 0.0, 0.0
+    instance = Instance(orbiting("tensor", propagator, **ROUGH[propagator]), optimised=False)
+    for _ in range(6):
+        state, orbit, step = random_flight(random)
+        assert instance.reset() == OK
+        assert instance.initialise(attitude_start=state[:4], angular_velocity_start=state[4:]) == OK
+        for each in orbit:
+            assert instance.set({"gravity.position": each[:3], "gravity.velocity": each[3:]}) == OK
+            assert instance.step(step) == OK, instance.log
+            state = by_scipy(state, each, step)
+            error, bound = apart(instance.get("attitude"), state[:4]), instance.get("error_bound")
+            assert error <= bound + SCIPY
+            told += bound < pi
+            largest = max(largest, error * (bound < pi))
+            share = max(share, error / (bound + SCIPY))
+    instance.free()
+    print(propagator, f"{told} of 24, errors up to {largest:.1e}, {share:.2f} of the bound")
+    assert told >= 10
+    assert largest > 10.0 * SCIPY
 
 
 @pytest.mark.parametrize("law", ["tensor", "decoupled"])

@@ -80,17 +80,17 @@ def flown_function(law: str, method: str) -> ca.Function:
     return ca.Function("flown", [x, bound, six, M, h], results)
 
 
-def rate_of(law: str, J: Array, torque: Array) -> Callable[[float, Array], Array]:
-    """Returns the rate of x and place, (13,), under a law, by numpy; mu is 1."""
+def rate_of(law: str, J: Array, torque: Array, mu: float = 1.0) -> Callable[[float, Array], Array]:
+    """Returns the rate of x and place, (13,), under a law, by numpy."""
     kept = J if law == "tensor" else np.diag(np.diag(J))
 
     def rate(t: float, state: Array) -> Array:
         q, w, r, v = state[:4], state[4:7], state[7:10], state[10:]
         d = np.linalg.norm(r)
         n = reference.rotation_matrix(q / np.linalg.norm(q)).T @ r / d
-        acting = torque + 3.0 / d**3 * np.cross(n, kept @ n)
+        acting = torque + 3.0 * mu / d**3 * np.cross(n, kept @ n)
         turning = reference.angular_acceleration(law, J, w, acting)
-        return np.concatenate([reference.attitude_dot(q, w), turning, v, -r / d**3])
+        return np.concatenate([reference.attitude_dot(q, w), turning, v, -mu / d**3 * r])
 
     return rate
 
