@@ -214,6 +214,18 @@ static double sum_of_sizes(const double numbers[], size_t count) {
    the largest double: no product in it has more than 500 of their binary digits. */
 static const double TAME_STEP = 0x1p40;
 
+/* Of the rates [rad/s, 1/s2] at which the place in a field of gravity changes. */
+static double size_of_field(const Instance *instance) {
+#if FIELD
+    const double *r = instance->left, *v = r + 3;
+    const double square = r[0] * r[0] + r[1] * r[1] + r[2] * r[2], distance = sqrt(square);
+    return sum_of_sizes(v, 3) / distance + GRAVITY_MU / square / distance;
+#else
+    (void)instance;
+    return 0.0;
+#endif
+}
+
 /* Takes the bound over a sub-step. Returns false where nothing is known any more: also where numbers are so far from 1
    that what the bound is made of may be no doubles. Where these may be too large, the importer's flags are kept from
    it: that takes twice the time. */
@@ -224,7 +236,7 @@ static bool carry(Instance *instance, const double x[], double size, const Progr
     const double power = progress->was_free ? 0.0 : progress->exponent;
     const double s[4] = {size, power, progress->found[0], progress->found[1]};
     const double sizes = sum_of_sizes(x + 4, 3) + sum_of_sizes(s, 4) + sum_of_sizes(now->bound, BOUND_COUNT) +
-                         sum_of_sizes(&now->values[REFERENCE_TORQUE], INPUT_U_COUNT);
+                         sum_of_sizes(&now->values[REFERENCE_TORQUE], INPUT_U_COUNT) + size_of_field(instance);
     const bool tame = now->constants_are_tame && sizes <= TAME_STEP;
     if (!tame && !(instance_is_ordinary(instance) && are_within(x, STATE_COUNT, ORDINARY))) return false;
     double after[BOUND_COUNT];

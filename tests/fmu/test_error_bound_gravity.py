@@ -165,6 +165,20 @@ def test_steps_too_long_for_the_place_to_be_known_say_nothing():
     assert np.all(np.isinf(np.array(long)))
 
 
+@pytest.mark.parametrize("mu", [1e-308, 1e-30, 1e30])
+def test_a_centre_that_hardly_attracts_or_much_too_strongly_raises_nothing(mu):
+    """`Instance` watches the floating-point flags of every call."""
+    raw = variant(orbiting("principal", "dop853", tolerance=1e-3), {"gravity.mu": mu})
+    raw["vessels"]["S"]["inertia"] = np.diag([2.0, 2.0, 2.0]).tolist()  # without a gradient
+    instance = Instance(raw, optimised=False)
+    assert instance.initialise() == OK
+    for step in (1.0, 100.0):
+        assert instance.step(step) == OK
+        bound = instance.get("error_bound")
+        assert bound < 1e-9 or (bound == pi and mu == 1e30)
+    instance.free()
+
+
 def test_it_is_refused_by_name_where_nothing_follows_the_place():
     raw = orbiting("none", "rk4")
     with pytest.raises(SceneError, match=r'outputs\.names: error_bound: rotation\.law = "none" with inputs'):

@@ -22,7 +22,7 @@ class CentreMotion:
     change    : it is off that at the start by at most that [1/s2]
     turn      : r^ turns by at most that in inertial axes [rad]
     pace      : the larger of |v|/|r| and sqrt(mu/|r|^3) at the start [rad/s]
-    fall_rate : sqrt(mu/|r|^3) at the start [rad/s]
+    fall_rate : sqrt(mu/|r|^3) at the start [rad/s], or SLOWEST, if that is more: it is divided by
     gone      : the step times pace [rad]
     nearest   : least |r| over that at the start
     scaled    : the larger of one over `nearest` and the largest |r| over that at the start
@@ -50,7 +50,7 @@ def centre_motion(field: Field, attitude: ca.SX, step: ca.SX) -> CentreMotion:
     position, velocity = field.start[:3], field.start[3:]
     square = ca.sumsqr(position)
     at_start = strength(field.mu, position)
-    fall_rate = ca.sqrt(at_start / 3.0)
+    fall_rate = ca.fmax(ca.sqrt(at_start / 3.0), SLOWEST)
     speed, radial = ca.sqrt(ca.sumsqr(velocity) / square), ca.dot(position, velocity) / square
     inward, outward = step * ca.fmax(-radial, 0.0), step * ca.fmax(radial, 0.0)
     fall, sway = (step * fall_rate) ** 2, step * speed
@@ -78,11 +78,14 @@ def centre_motion(field: Field, attitude: ca.SX, step: ca.SX) -> CentreMotion:
     )
 
 
+SLOWEST = 2.0**-100
+"""A rate [rad/s] of no account, far above the least double."""
+
 SLACK = 1.0 + 2.0**-44
 """For the rounding of some dozen operations on positive numbers."""
 
 FARTHEST_OFF = 2.0**-6
-"""Largest error of the centre's place, over its distance, of which the bound is finite."""
+"""Largest error of the centre's place, over its distance, with which the bound is finite."""
 
 STEADY = 2.2
 """Bound of the gradient of gravity's acceleration, over mu/|r|^3, at most 2 FARTHEST_OFF away from r."""
@@ -96,11 +99,10 @@ def place_during(centre: CentreMotion, place: ca.SX, step: ca.SX) -> ca.SX:
     """Returns the error of the place at most during a step, from that at its start. [EB] eq. (54).
 
     place : the larger of the position's error over |r| and the velocity's over |r| fall_rate, at the start;
-            so is the result, in the units of the start; infinite where more than FARTHEST_OFF
+            so is the result, in the units of the start; it holds up to FARTHEST_OFF
     """
     exponent = STEADY * step * centre.fall_rate / centre.nearest**3
-    found = place * ca.exp(ca.fmin(exponent, LONGEST)) * SLACK
-    return ca.if_else(found <= FARTHEST_OFF, found, ca.inf)
+    return place * ca.exp(ca.fmin(exponent, LONGEST)) * SLACK
 
 
 def place_after(centre: CentreMotion, during: ca.SX, added: ca.SX) -> ca.SX:

@@ -32,7 +32,12 @@ from supervessel.rotation.error_bound.carried import (
     largest_residual,
     motion_bounds,
 )
-from supervessel.rotation.error_bound.centre_motion import centre_motion, place_after, place_during
+from supervessel.rotation.error_bound.centre_motion import (
+    FARTHEST_OFF,
+    centre_motion,
+    place_after,
+    place_during,
+)
 from supervessel.rotation.error_bound.constants import BoundConstants, constants_of, restored
 from supervessel.rotation.error_bound.remainder import (
     UNKNOWN,
@@ -81,12 +86,13 @@ def bound_after_step(
     if centre is None or constants.gradient is None:
         return CarriedBound(carried(bound, norm.rate_share, growth, residual, step), motion, ca.SX(0.0))
     coupling = centre.strongest * constants.gradient.coupling
-    off = ca.SX(0.0)
+    off, known = ca.SX(0.0), centre.known
     if bound.numel() > 2:
         off = place_during(centre, bound[2], step)
-        residual += PLACE_SHARE * coupling * (off / centre.nearest)
+        residual += PLACE_SHARE * coupling * (ca.fmin(off, FARTHEST_OFF) / centre.nearest)
+        known = ca.logic_and(known, off <= FARTHEST_OFF)
     found = carried_in_orbit(bound, norm.rate_share, Drive(growth, residual, coupling), step)
-    return CarriedBound(found + ca.if_else(centre.known, 0.0, ca.inf), motion, off)
+    return CarriedBound(found + ca.if_else(known, 0.0, ca.inf), motion, off)
 
 
 PLACE_SHARE = 3.0

@@ -200,7 +200,7 @@ def place_error(remainder: Remainder | None, motion: MotionBounds, estimate: ca.
     error = relative * (rounding + remainder.place * power)
     if estimate is None:
         return error
-    off = remainder.guess * _power(centre.gone, remainder.power)
+    off = remainder.guess * _power(ca.fmin(centre.gone, 1.0), remainder.power)
     if remainder.turns:
         gone = ca.fmax(centre.gone, SHORTEST)
         off += CAUTION * (estimate[0] / ca.fmin(gone * gone, 1.0))
