@@ -145,8 +145,9 @@ REFUSED: list[tuple[str, Any, str]] = [
         [0, -1e101, 0],
         "gravity.velocity = (0, -1e+101, 0) m/s: must be at most 1e+100 m/s",
     ),
-    ("gravity.position", [0, 0, 0], "gravity.position = (0, 0, 0) m: must be more than twice"),
-    ("gravity.position", [60.0, 0, 0], "the assembly's size, 62.2"),
+    ("gravity.position", [0, 0, 0], "gravity.position = (0, 0, 0) m: must be longer than"),
+    ("gravity.position", [60.0, 0, 0], "longer than 62.2"),
+    ("gravity.position", [0, 60.0, 0], " m, twice the assembly's size"),
     ("gravity.position[2]", np.nan, "gravity.position[2] = nan m: must be finite"),
 ]
 
