@@ -165,7 +165,8 @@ def _composite_problems(scene: Scene) -> list[str]:
     three = ", ".join(f"{moment:.10g}" for moment in principal_moments(turning_at_start(scene, c)))
     allowed = f'must be positive beyond rounding for rotation.law = "{law}"'
     without = " without what its wheels have about their axes" if scene.wheels else ""
-    return [f"vessels: the composite{without} has principal moments {three} kg m2: {allowed}"]
+    included = "; a vessel's moments include those of its wheels" if scene.wheels else ""
+    return [f"vessels: the composite{without} has principal moments {three} kg m2: {allowed}{included}"]
 
 
 def _place_problems(scene: Scene, c: Mapping[str, NDArray[np.float64]]) -> list[str]:

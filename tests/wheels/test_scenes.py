@@ -27,7 +27,7 @@ WHEEL = "vessels.B.wheels.x"
             {f"{WHEEL}.inertia": 90.0},
             "vessels: the composite without what its wheels have about their axes has principal moments "
             "-0.9496111205, 116.9826135, 148.9669976 kg m2: must be positive beyond rounding for "
-            'rotation.law = "tensor"',
+            'rotation.law = "tensor"; a vessel\'s moments include those of its wheels',
         ),
         (
             {"rotation.law": "none"},
