@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from supervessel import Twin, reference
 from support import OK, Array, Instance, U, body, scene, store, variant
 from support.gyrostat import Course, Gyrostat, GyrostatState
+from support.orbits import orbiting
 from wheels.scenes import AXES, CARRIER, GYROSTAT, INERTIA, INERTIAS, MOTION, WHEELS
 
 LAW = pytest.mark.parametrize("law", ["decoupled", "principal", "tensor"])
@@ -263,3 +264,33 @@ def test_principal_axes_are_those_of_the_tensor_without_wheels():
     assert np.abs(axes @ np.diag(moments.ravel()) @ axes.T - K).max() <= 64 * U * np.abs(K).max()
     J = outputs(twin(), twin().x_start, [0.0] * 5, [])["inertia"]
     assert J.tolist() == np.ravel(INERTIA).tolist()
+
+
+# Motors that hold a spin
+
+
+@LAW
+def test_motors_hold_a_spin_in_orbit_by_the_least_torques(law):
+    changes = {
+        "rotation.law": law,
+        "vessels.B.wheels.more": {"axis": [0, 1, 0]},
+        "inputs.wheel": ["B.x", "B.tilted", "B.store", "B.more"],
+    }
+    of = Twin(scene(orbiting(changes, GYROSTAT)))
+    u = numbers(of.trim_by_wheels(of.x_start, of.p_start))
+    assert of.u_names[3:] == tuple(f"{wheel}.torque" for wheel in changes["inputs.wheel"])
+    assert u[:3].tolist() == [0.0] * 3
+    axes = np.vstack([AXES, [0.0, 1.0, 0.0]]).T
+    least = -np.linalg.pinv(axes) @ numbers(of.trim(of.x_start, of.p_start))[:3]
+    assert np.abs(u[3:] - least).max() <= 64 * U * np.abs(least).max()
+    moved = numbers(of.ode(of.x_start, np.zeros(len(u)), of.p_start))[4:7]
+    assert np.abs(numbers(of.ode(of.x_start, u, of.p_start))[4:7]).max() <= 64 * U * np.abs(moved).max()
+
+
+@pytest.mark.parametrize("wheels", [["B.x", "B.store"], []])
+def test_motors_that_cannot_hold_every_spin_are_refused(wheels):
+    of = Twin(scene(variant(GYROSTAT, {"inputs.wheel": wheels, "inputs.torque": False})))
+    with pytest.raises(ValueError, match='trim_by_wheels: scene "gyrostat" needs motors of wheels'):
+        assert of.trim_by_wheels
+    with pytest.raises(ValueError, match="under .inputs." + ("; .* take trim_by_wheels" if wheels else "$")):
+        assert of.trim

@@ -16,7 +16,7 @@ from supervessel import Twin
 from supervessel.equations import equations
 from support import DISCARD, OK, Array, Instance, U, refusal, scene, store, variant
 from support.marks import FMI
-from wheels.scenes import AXES, CARRIER, GYROSTAT, INERTIA, MOTION, RATES
+from wheels.scenes import CARRIER, GYROSTAT, MOTION, RATES
 
 H, STEPS = 0.25, 12
 """s, and how many communication steps."""
@@ -402,20 +402,3 @@ def test_the_twin_for_control_has_the_wheels_behind_the_seven():
     with pytest.raises(ValueError, match=r"error_bound: .* has wheels"):
         _ = of.error_bound
     assert ca.SX(of.to_dae()["ode"]).numel() == 10
-
-
-def test_three_motors_hold_the_rate_and_two_are_refused():
-    of = Twin(scene(variant(GYROSTAT, {"inputs.wheel": ["B.x", "B.tilted", "B.store"]})))
-    u = np.array(of.trim_by_wheels(of.x_start, of.p_start)).ravel()
-    held = np.array(of.trim(of.x_start, of.p_start)).ravel()[:3]
-    assert u[:3].tolist() == [0.0] * 3
-    assert np.abs(AXES.T @ u[3:] + held).max() <= 32 * U * np.abs(held).max()
-    x_dot = np.array(of.ode(of.x_start, u, of.p_start)).ravel()
-    assert np.abs(x_dot[4:7]).max() <= 1e3 * U * np.abs(np.linalg.solve(INERTIA, held)).max()
-    with pytest.raises(ValueError, match="has motors of 2 wheels: must be three or more"):
-        _ = twin("gyrostat").trim_by_wheels
-    in_a_plane = {"x": [1, 0, 0], "tilted": [0, 1, 0], "store": [1, 1, 0]}
-    axes = {f"vessels.B.wheels.{name}.axis": axis for name, axis in in_a_plane.items()}
-    flat = variant(GYROSTAT, axes | {"inputs.wheel": ["B.x", "B.tilted", "B.store"]})
-    with pytest.raises(ValueError, match="on axes that are not in one plane"):
-        _ = Twin(scene(flat)).trim_by_wheels

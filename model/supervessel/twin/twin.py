@@ -16,7 +16,6 @@ from supervessel.problems import unknown
 from supervessel.rotation.attitude import to_inertial, unit
 from supervessel.rotation.dynamics import Dynamics, dynamics_of
 from supervessel.rotation.principal import principal
-from supervessel.scene.inputs import WHEEL_TORQUE
 from supervessel.twin.conventions import acados_model, do_mpc_model
 from supervessel.twin.error_state import error_rate, retracted, state_error
 from supervessel.twin.functions import TwinFunction
@@ -77,8 +76,8 @@ class Twin(Plant):
 
     `composite`, `ode`, `step`, `longest_step`, `outputs`, `rollout` and `communication_step` give the FMU's
     numbers; `error_bound` and `error_bound_change` bound what law and method are off by; `error`, `retract`,
-    `error_ode`, `linearise`, `discretise`, `trim`, `principal`, `invariants` are for control design. All have
-    named arguments, are made when first used, and check numbers that they are
+    `error_ode`, `linearise`, `discretise`, `trim`, `trim_by_wheels`, `principal`, `invariants` are for
+    control design. All have named arguments, are made when first used, and check numbers that they are
     called with (`TwinFunction`). p, u, x, h are symbols; p_names, u_names, x_names, y_names the FMU's names,
     structured ones always; p_start and x_start the scene's values.
 
@@ -172,6 +171,7 @@ class Twin(Plant):
     def linearise(self) -> TwinFunction:
         """x, u, p -> A (6, 6), B (6, m), E (6, n): e_dot = A e + B du + E dp about x, u, p.
 
+        Each wheel adds a row to all three and a column to A, as it adds a number to e.
         e is the error state, (6,) [rad, rad/s], to first order the same for each form of the error. A model
         of the seven numbers of x has an uncontrollable direction, the length of the attitude; this one has
         not, so that a Riccati equation has a solution.
@@ -214,41 +214,43 @@ class Twin(Plant):
             >>> float(ca.norm_inf(twin.ode(twin.x_start, u, twin.p_start)[4:])) < 1e-18
             True
         """
-        self.check_torque("trim")
+        self.check_torque("trim", otherwise="; for motors of wheels take trim_by_wheels")
         u = ca.vertcat(self._holding_torque, ca.SX.zeros(len(self.u_names) - 3))
         return self._function("trim", {"x": self.x, "p": self.p}, {"u": u})
 
     @cached_property
     def trim_by_wheels(self) -> TwinFunction:
-        """x, p -> u, (m,), whose motors keep the angular velocity of x constant; all else in u is zero.
+        """x, p -> u, (m,), whose motors of wheels keep the angular velocity of x constant; all else is zero.
 
-        It is the torque of `trim`, exerted by the motors; of all that do it those whose squares add up to the
-        least. The wheels take up what the body does not: it holds for the x it is asked for, and along a
-        flight it is asked again. NaN while docks do not hold motors on three axes to the root. Raises
-        ValueError for a scene with fewer than three motors, or all of them in one plane.
+        Of more than three motors the torques of the least sum of squares. They are there as long as the axes
+        of the motors lie in no common plane; where under p they do, or docks do not hold enough of their
+        vessels to the root, the result means nothing. Raises ValueError where it is so at the start.
+
+        Source: [EQ] Wheels, eq. (17) with omega' = 0: B u = -torque, u = -B^T (B B^T)^-1 torque, with the
+        axes b_w as columns of B.
 
         Example:
             >>> from supervessel import Twin, load_scene
-            >>> crewed = Twin(load_scene("examples/station_momentum.toml"))
-            >>> u = crewed.trim_by_wheels(crewed.x_start, crewed.p_start)
-            >>> float(ca.norm_inf(crewed.ode(crewed.x_start, u, crewed.p_start)[4:7])) < 1e-18
+            >>> twin = Twin(load_scene("examples/station_momentum.toml"))
+            >>> u = twin.trim_by_wheels(twin.x_start, twin.p_start)
+            >>> float(ca.norm_inf(twin.ode(twin.x_start, u, twin.p_start)[4:7])) < 1e-18
             True
         """
-        motors = [i for i, variable in enumerate(self.u_variables) if variable.kind is WHEEL_TORQUE]
-        wheels, known = self._dynamics.wheels, list(self.scene.wheels)
-        places = [known.index(self.u_variables[i].owner) for i in motors]
-        axes = ca.SX(3, 0) if wheels is None else wheels.axes.axes[:, places]
-        square = axes @ axes.T
-        if len(motors) < 3 or (square.is_constant() and np.linalg.matrix_rank(ca.DM(square).full()) < 3):
-            said = f'trim_by_wheels: scene "{self.scene.name}" has motors of {len(motors)} wheels'
-            raise ValueError(f"{said}: must be three or more, on axes that are not in one plane")
-        u = ca.SX.zeros(len(self.u_names))
-        u[motors] = -axes.T @ (ca.inv_minor(square) @ self._holding_torque)
+        wheels = self._dynamics.wheels
+        # columns of what is no motor are 0
+        axes = ca.SX(3, 0) if wheels is None else ca.jacobian(wheels.reaction, self.u)
+        at_start = np.array(ca.Function("axes", [self.p], [axes])(self.p_start))
+        if not at_start.size or np.linalg.matrix_rank(at_start) < 3:
+            raise ValueError(
+                f'trim_by_wheels: scene "{self.scene.name}" needs motors of wheels, listed in inputs.wheel, '
+                "whose axes lie in no common plane at the start"
+            )
+        u = -axes.T @ ca.solve(axes @ axes.T, self._holding_torque)
         return self._function("trim_by_wheels", {"x": self.x, "p": self.p}, {"u": u})
 
-    @property
+    @cached_property
     def _holding_torque(self) -> ca.SX:
-        """The torque, (3,) [N m], body axes, that keeps the angular velocity of x constant."""
+        """The torque, (3,) [N m], body axes, under which the angular velocity of x stays: see `trim`."""
         omega = self.x[4:7]
         torque = ca.cross(omega, self._turning @ omega + self._spin)
         field = self._dynamics.field
@@ -315,10 +317,11 @@ class Twin(Plant):
         moving = [*rate, *[moment / time] * len(self.scene.wheels)]
         return Scales(np.array([1.0] * 4 + moving), torque, np.array(p), np.array([1.0] * 3 + moving), time)
 
-    def check_torque(self, what: str, *, motors: bool = False) -> None:
+    def check_torque(self, what: str, *, motors: bool = False, otherwise: str = "") -> None:
         """Raises ValueError where the scene has no torque input, which `what` needs.
 
-        motors : whether a motor of a wheel does as well
+        motors    : whether a motor of a wheel does as well
+        otherwise : what else to do where the scene has such motors, end of the message
 
         Example:
             >>> twin.check_torque("my controller")
@@ -327,6 +330,7 @@ class Twin(Plant):
         if not (inputs.torque or (motors and inputs.wheel)):
             raise ValueError(
                 f'{what}: scene "{self.scene.name}" has no torque input; put "torque = true" under [inputs]'
+                + (otherwise if inputs.wheel else "")
             )
 
     @cached_property
