@@ -61,9 +61,9 @@ DISCARDS = "read; a step in which a torque, gravity included, acts or a port mov
 """What becomes of what keeps the motion from being free where the propagator knows no other."""
 
 INTRODUCTION = """
-What a scene may have under each propagator in co-simulation: under every law, but where a cell names a law.
-Letters stand for what is listed below, reasons of a refusal in its own words. `split` has a torque input too,
-but in the first column.
+What a scene may have under each propagator in co-simulation. A cell holds for every law, but for the laws
+that it names. Letters stand for the reasons listed below, in the words of the refusal. The scenes behind the
+row of `split` have a torque input in every column but the first.
 """
 BETWEEN = """
 In scenes with `[accuracy]`, in a trade (which propagators it tries), and among derivatives of the FMU:
