@@ -151,14 +151,15 @@ def test_the_twin_of_the_readme_ends_as_near_as_it_says(started):
 
 
 def test_the_flights_of_the_page_on_the_fmu_print_what_it_says(started):
-    """The same flight by FMPy and by CasADi."""
-    flight, imported = blocks("fmu_build/docs/fmu.md", "python")
+    """The same flight by FMPy and by CasADi, and one along an orbit."""
+    flight, orbit, imported = blocks("fmu_build/docs/fmu.md", "python")
     said = re.search(r"# ([\d.]+) m2, ([\d.]+) rad/s$", flight, re.MULTILINE)
     assert said is not None
     pmi, rate = map(float, run(flight, started).split())
     assert (f"{pmi:.3f}", f"{rate:.6f}") == said.groups()
     assert f"# {float(run(imported, started)):.6f} rad/s" in imported
     assert f"# {rate:.6f} rad/s" in imported
+    assert f"# {float(run(orbit, started).splitlines()[-1]):.6f} rad/s" in orbit
 
 
 def test_the_messages_of_the_page_on_scenes_are_the_real_ones():
