@@ -49,6 +49,7 @@ def life(instance: Instance, exchange: bool, seed: int) -> list[bytes]:
         instance.set({"DG.mass": -1.0})
         if exchange or instance.fmi == 3:
             assert instance.get_status("mass") == DISCARD
+        assert instance.set({"DG.mass": 12e3}) == OK  # an event does not begin from a mass that cannot be
         if generator.uniform() < 0.5:
             instance.fmu.setFMUState(state)
             instance.time = instance.get("time")
