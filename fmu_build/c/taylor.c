@@ -2,7 +2,7 @@
    error.
 
    Needs of the model: by_torque, the acceleration by torque, and the map in a that says what the law's products are;
-   with wheels held, the momentum that they hold and its rate. */
+   with wheels held, the momentum that they hold and its rate, and what estimated_steps.c needs. */
 #include <string.h>
 
 #include "composite.h"
