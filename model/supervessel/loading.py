@@ -185,6 +185,6 @@ def _place_problems(scene: Scene, c: Mapping[str, NDArray[np.float64]]) -> list[
     ]
     nearest, position = 2.0 * sqrt(float(c["pmi"].sum())), scene.gravity_start[0]
     if not problems and not hypot(*position) > nearest:
-        allowed = f"must be more than twice the assembly's size, {nearest:.6g} m long"
+        allowed = f"must be longer than {nearest:.6g} m, twice the assembly's size"
         problems.append(f"{table}.position = {quantity(position, 'm')}: {allowed}")
     return problems

@@ -101,7 +101,7 @@ def test_a_place_that_has_no_meaning_at_the_start_is_refused():
         "inputs": {"gravity": True},
         "gravity": {"mu": EARTH, "position": [3.4, 0.7, 0.0], "velocity": [0.0, 7000.0, 0.0]},
     }
-    near = "m: must be more than twice the assembly's size, 3.4641 m long"
+    near = "m: must be longer than 3.4641 m, twice the assembly's size"
     for changes, expected in (
         ({"gravity.position": [3.4, 0.0, 0.0]}, [f"gravity.position = [3.4, 0.0, 0.0] {near}"]),
         ({"gravity.position": [0.0, 0.0, 0.0]}, [f"gravity.position = [0.0, 0.0, 0.0] {near}"]),
