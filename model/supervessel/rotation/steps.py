@@ -32,9 +32,9 @@ class StepFunctions:
     propagation    : the functions that the scene's co-simulation uses: of fastest_square and step as many as
                      its method needs, with wheels always the first; by_torque: u, c -> angular acceleration
                      by the torque alone, (3,) [rad/s2], for Taylor steps, and with wheels held, see
-                     `_held_function`; free_...: exact free motion, see `propagators.exact`; rounding: x, u, c, h -> angle [rad] by which
-                     rounding of the tensor turns the body in h, where the scene shows its error and the law
-                     has a gyroscopic term
+                     `_held_function`; free_...: exact free motion, see `propagators.exact`; rounding: x, u,
+                     c, h -> angle [rad] by which rounding of the tensor turns the body in h, where the scene
+                     shows its error and the law has a gyroscopic term
     """
 
     fastest_square: ca.Function
