@@ -250,9 +250,21 @@ void instance_start_rate(Instance *instance) {
     instance_state_moved(instance);
 }
 
+/* Judges the momenta of wheels at the start; their parameters follow those of the attitude. */
+static Status check_momenta(Instance *instance) {
+    for (size_t i = 7; i < STATE_COUNT; i++) {
+        const double momentum = instance_x(instance)[i];
+        if (fabs(momentum) <= LARGEST_MOMENTUM) continue;
+        return instance_refuse(instance, "%s = %.10g N.m.s: must be at most %g either way",
+                               VARIABLES[REFERENCE_ATTITUDE_START + 4 + (i - 7)].name, momentum, LARGEST_MOMENTUM);
+    }
+    return STATUS_OK;
+}
+
 Status instance_exit_initialization(Instance *instance) {
     instance_start_rate(instance);
     Status status = instance_start_attitude(instance);
+    if (status == STATUS_OK) status = check_momenta(instance);
     if (status == STATUS_OK) status = composite_refresh(instance);
     if (status == STATUS_OK) status = field_check(instance);
     if (status == STATUS_OK) status = motors_check(instance);

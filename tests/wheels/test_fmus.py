@@ -188,6 +188,18 @@ def test_a_vessel_with_wheels_must_have_mass_and_more_about_their_axes(fmi):
     instance.free()
 
 
+@FMI
+def test_a_momentum_beyond_numbers_is_refused_at_the_start_by_name(fmi):
+    instance = Instance(CARRIER, fmi)
+    assert instance.enter() == OK
+    assert instance.set({"B.store.momentum_start": -1e101}) == OK
+    assert instance.exit() == refusal(fmi)
+    assert "B.store.momentum_start = -1e+101 N.m.s: must be at most 1e+100" in instance.messages()[-1]
+    assert instance.set({"B.store.momentum_start": -2.0}) == OK
+    assert instance.exit() == OK
+    instance.free()
+
+
 def test_a_tensor_that_its_wheels_use_up_is_refused():
     raw = variant(
         CARRIER,

@@ -20,8 +20,18 @@ WHEEL = "vessels.B.wheels.x"
         ({f"{WHEEL}.axis": [0, 0, 0]}, f"{WHEEL}.axis = [0.0, 0.0, 0.0]: must have a length greater than 0"),
         ({f"{WHEEL}.axis": None}, f"{WHEEL}.axis: missing"),
         ({f"{WHEEL}.inertia": -1.0}, f"{WHEEL}.inertia = -1.0 kg m2: must be a finite number >= 0"),
-        ({f"{WHEEL}.momentum": float("nan")}, f"{WHEEL}.momentum = nan N m s: must be a finite number"),
-        ({f"{WHEEL}.momentum": 1e999}, f"{WHEEL}.momentum = inf N m s: must be a finite number"),
+        (
+            {f"{WHEEL}.momentum": float("nan")},
+            f"{WHEEL}.momentum = nan N m s: must be a number up to 1e+100 either way",
+        ),
+        (
+            {f"{WHEEL}.momentum": 1e999},
+            f"{WHEEL}.momentum = inf N m s: must be a number up to 1e+100 either way",
+        ),
+        (
+            {f"{WHEEL}.momentum": -1e101},
+            f"{WHEEL}.momentum = -1e+101 N m s: must be a number up to 1e+100 either way",
+        ),
         ({f"{WHEEL}.speed": 3.0}, f'{WHEEL}: unknown key "speed"; known: axis, inertia, momentum'),
         (
             {f"{WHEEL}.inertia": 90.0},

@@ -172,7 +172,12 @@ Direction = Annotated[
 Velocity = Annotated[Vector, vector("m/s", "three finite numbers")]
 Mu = Annotated[float, number("m3/s2", "a finite number > 0", 0.0, open_low=True)]
 WheelInertia = Annotated[float, number("kg m2", "a finite number >= 0", 0.0)]
-WheelMomentum = Annotated[float, number("N m s", "a finite number")]
+LARGEST_MOMENTUM = 1e100
+"""Of a wheel [N m s], either way: what it does to a rate is a double."""
+WheelMomentum = Annotated[
+    float,
+    number("N m s", f"a number up to {LARGEST_MOMENTUM:g} either way", -LARGEST_MOMENTUM, LARGEST_MOMENTUM),
+]
 AngularVelocity = Annotated[Vector, vector("rad/s", "three finite numbers")]
 Seconds = Annotated[float, number("s", "a finite number > 0", 0.0, open_low=True)]
 Angle = Annotated[float, number("rad", "a number from 1e-6 to 1", 1e-6, 1.0)]

@@ -189,6 +189,7 @@ class Twin(Plant):
     def discretise(self) -> TwinFunction:
         """x, u, p, h -> A (6, 6), B (6, m), E (6, n): e_next = A e + B du + E dp over one `step` from x.
 
+        Each wheel makes them larger as it does those of `linearise`.
         These are derivatives of `step` itself, not the exponential of `linearise`: they hold about any
         trajectory, as exactly as the propagator steps. u and p are held over the step of h [s].
 
