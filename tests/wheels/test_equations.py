@@ -294,3 +294,11 @@ def test_motors_that_cannot_hold_every_spin_are_refused(wheels):
         assert of.trim_by_wheels
     with pytest.raises(ValueError, match="under .inputs." + ("; .* take trim_by_wheels" if wheels else "$")):
         assert of.trim
+
+
+def test_motors_in_one_plane_are_refused():
+    in_a_plane = {"x": [1, 0, 0], "tilted": [0, 1, 0], "store": [1, 1, 0]}
+    axes = {f"vessels.B.wheels.{name}.axis": axis for name, axis in in_a_plane.items()}
+    of = Twin(scene(variant(GYROSTAT, axes | {"inputs.wheel": [f"B.{name}" for name in in_a_plane]})))
+    with pytest.raises(ValueError, match="whose axes lie in no common plane"):
+        assert of.trim_by_wheels
