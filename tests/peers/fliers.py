@@ -16,9 +16,7 @@ from typing import Any
 
 import numpy as np
 from engines import Array
-
-Flight = Callable[[], Array]
-Settings = Iterator[tuple[str, Callable[[], Flight]]]
+from ladder import Flight, Settings
 
 MOMENTS = (1.0, 2.0, 3.0)  # kg m2
 RATES = (1.0, 2.0, 0.5)  # rad/s

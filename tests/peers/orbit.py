@@ -13,17 +13,16 @@ plain step is timed in the same process, in turn. What is not installed is left 
 import math
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 import numpy as np
+from engines import Array
 from fmpy import extract, read_model_description
-from from_python import plain_step
+from ladder import Flight, Judge, Ladder, Result, Settings
 from own import Built
 from run import build_host
 
@@ -33,13 +32,8 @@ from supervessel import parse_scene
 from support.gyrostat import Course, Gyrostat, GyrostatState
 from support.orbits import EARTH, HEIGHT, SPEED
 
-Array = np.ndarray
-Flight = Callable[[], Array]
-Settings = Iterator[tuple[str, Callable[[], Flight]]]
-
 ENOUGH = 1e-9  # rad
-LONGEST_FLIGHT, LONGEST_LADDER = 20.0, 60.0  # s of the processor; a way is not taken further than this
-ROUNDS = 3
+LADDER = Ladder(ENOUGH, 20.0, 60.0)
 ORBIT_RATE = SPEED / HEIGHT
 
 
@@ -277,16 +271,6 @@ def built(folder: Path, work: Work, propagator: str, angle: float) -> Built:
     return Built(Path(extract(str(fmu), str(place / "unpacked"))), read_model_description(str(fmu)))
 
 
-@dataclass(frozen=True)
-class Result:
-    """A cost in plain RK4 steps, the error of the attitude at the end [rad], and the setting in words."""
-
-    cost: float
-    error: float
-    text: str
-
-
-Judge = Callable[[Array], float]
 Measure = Callable[[Path, Work, Judge], Result | None]
 
 
@@ -315,35 +299,7 @@ def natively(propagator: str) -> Measure:
 
 def by_ladder(ways: Callable[[Work], Settings]) -> Measure:
     """Returns the measurement of a way in Python: its first setting that is accurate enough, or its best."""
-
-    def measure(folder: Path, work: Work, judge: Judge) -> Result | None:
-        begun, best = time.process_time(), None
-        for text, ready in ways(work):
-            fly = ready()
-            started = time.process_time()
-            off = judge(fly())
-            taken = time.process_time() - started
-            if best is None or off < best[0]:
-                best = off, text, ready
-            if off <= ENOUGH or taken > LONGEST_FLIGHT or time.process_time() - begun > LONGEST_LADDER:
-                break
-        if best is None:
-            return None
-        off, text, ready = best
-        return Result(_cost(ready, folder), off, text)
-
-    return measure
-
-
-def _cost(ready: Callable[[], Flight], folder: Path) -> float:
-    """Returns the median cost of a flight in plain RK4 steps."""
-    plain, ratios = plain_step(folder), []
-    for _ in range(ROUNDS):
-        fly = ready()
-        unit, begun = plain(), time.process_time()
-        fly()
-        ratios.append(1e9 * (time.process_time() - begun) / unit)
-    return median(ratios)
+    return lambda folder, work, judge: LADDER.climb(ways(work), folder, judge)
 
 
 WAYS: list[tuple[str, str, Measure]] = [

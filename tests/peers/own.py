@@ -10,10 +10,11 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from fliers import DURATION, MOMENTS, RATES, Flight, Settings, Work
+from fliers import DURATION, MOMENTS, RATES, Work
 from fmpy import extract, read_model_description
 from fmpy.fmi3 import FMU3Slave
 from fmpy.model_description import ModelDescription
+from ladder import Flight, Settings
 
 from fmu_build import build_fmu
 from fmu_build.platforms import host_platform

@@ -15,18 +15,16 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 import fliers
 import numpy as np
 import own
-from fliers import Array, Settings, Work
-from from_python import plain_step
+from fliers import Work
+from ladder import Judge, Ladder, Result, Settings
 from run import build_host
 
 from peers import NAMES, version
@@ -36,8 +34,7 @@ HERE = Path(__file__).resolve().parent
 MODULES = (HERE.parent, HERE.parent / "bench")
 ENOUGH = 1e-8  # rad
 SECONDS = 300.0  # of one way on one work, then its process ends
-LONGEST_FLIGHT, LONGEST_LADDER = 4.0, 15.0  # s of the processor; a way is not taken further than this
-ROUNDS = 3
+LADDER = Ladder(ENOUGH, 4.0, 15.0)
 TORQUE = (0.1, -0.2, 0.15)  # N m
 FREE = (0.0, 0.0, 0.0)
 WORKS = {
@@ -49,50 +46,12 @@ WORKS = {
 ANGLES = [0.03 * 2.0 ** (-quarter / 4.0) for quarter in range(14)]  # rad, of rk4's sub-steps
 
 
-@dataclass(frozen=True)
-class Result:
-    """A cost in plain RK4 steps, the error of the attitude at the end [rad], and the setting in words."""
-
-    cost: float
-    error: float
-    text: str
-
-
 Measured = Result | None
-Judge = Callable[[Any], float]
 
 
 def by_ladder(ways: Callable[[Work], Settings]) -> Callable[[Path, Work, Judge], Measured]:
     """Returns the measurement of a way in Python: its first setting that is accurate enough, or its best."""
-
-    def measure(folder: Path, work: Work, judge: Judge) -> Measured:
-        begun, best = time.process_time(), None
-        for text, ready in ways(work):
-            fly = ready()
-            start = time.process_time()
-            off = judge(fly())
-            taken = time.process_time() - start
-            if best is None or off < best[0]:
-                best = off, text, ready
-            if off <= ENOUGH or taken > LONGEST_FLIGHT or time.process_time() - begun > LONGEST_LADDER:
-                break
-        if best is None:
-            return None
-        off, text, ready = best
-        return Result(_cost(ready, folder), off, text)
-
-    return measure
-
-
-def _cost(ready: Callable[[], Callable[[], Array]], folder: Path) -> float:
-    """Returns the median cost of a flight in plain RK4 steps."""
-    plain, ratios = plain_step(folder), []
-    for _ in range(ROUNDS):
-        fly = ready()
-        unit, begun = plain(), time.process_time()
-        fly()
-        ratios.append(1e9 * (time.process_time() - begun) / unit)
-    return median(ratios)
+    return lambda folder, work, judge: LADDER.climb(ways(work), folder, judge)
 
 
 def natively(propagator: str) -> Callable[[Path, Work, Judge], Measured]:
