@@ -5,9 +5,6 @@
 
 #include "variables.h"
 
-/* Squares and cubes of lengths and speeds up to this are doubles. */
-static const double LARGEST = 1e100;
-
 static Status refuse(Instance *instance, size_t reference, const char *allowed, double limit,
                      const char *which) {
     const double *v = &instance->now.values[reference];
@@ -20,8 +17,8 @@ static Status refuse(Instance *instance, size_t reference, const char *allowed, 
 Status field_check(Instance *instance) {
     enum { POSITION = REFERENCE_TORQUE + FIELD_PLACE, VELOCITY = POSITION + 3 };
     const double *r = &instance->now.values[POSITION], *c = instance->now.c, *J = &c[COMPOSITE_INERTIA];
-    if (!are_within(r, 3, LARGEST)) return refuse(instance, POSITION, "at most", LARGEST, " long");
-    if (!are_within(r + 3, 3, LARGEST)) return refuse(instance, VELOCITY, "at most", LARGEST, " long");
+    if (!are_within(r, 3, LARGEST_PLACE)) return refuse(instance, POSITION, "at most", LARGEST_PLACE, " long");
+    if (!are_within(r + 3, 3, LARGEST_PLACE)) return refuse(instance, VELOCITY, "at most", LARGEST_PLACE, " long");
     const double nearest = 4.0 * (J[0] / c[COMPOSITE_MASS] + J[1] / c[COMPOSITE_MASS] + J[2] / c[COMPOSITE_MASS]);
     const double square = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
     if (square > nearest) return STATUS_OK;

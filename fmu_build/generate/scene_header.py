@@ -20,7 +20,13 @@ from supervessel.rotation.propagators.taylor import (
     MOST_ORDER,
 )
 from supervessel.rotation.propagators.theta import CONSTANTS
-from supervessel.scene.numbers import LARGEST_MOMENTUM, LARGEST_TOLERANCE, LEAST_TOLERANCE, TRIANGLE_SLACK
+from supervessel.scene.numbers import (
+    LARGEST_MOMENTUM,
+    LARGEST_PLACE,
+    LARGEST_TOLERANCE,
+    LEAST_TOLERANCE,
+    TRIANGLE_SLACK,
+)
 from supervessel.scene.schema import PARALLEL_LIMIT, Scene
 
 
@@ -211,6 +217,7 @@ COMMON = {
     "LARGEST_TURN": f"{LARGEST_TURN!r} /* up to which free motion is followed [rad] */",
     "TRIANGLE_SLACK": f"{TRIANGLE_SLACK!r} /* of a sum of two moments beside the third, relative */",
     "PARALLEL_LIMIT": f"{PARALLEL_LIMIT!r} /* least angle of alignment and direction [rad] */",
+    "LARGEST_PLACE": f"{LARGEST_PLACE!r} /* in a field of gravity [m, m/s] */",
     "LARGEST_MOMENTUM": f"{LARGEST_MOMENTUM!r} /* of a wheel, either way [N.m.s] */",
     "LEAST_TOLERANCE": repr(LEAST_TOLERANCE),
     "LARGEST_TOLERANCE": repr(LARGEST_TOLERANCE),

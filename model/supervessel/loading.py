@@ -16,12 +16,10 @@ from supervessel.orbit import orbit_problem
 from supervessel.problems import SceneError, few_suggestions, key_path, quantity, unknown
 from supervessel.scene.consistency import consistency_problems
 from supervessel.scene.names import misnamed_courses, naming_problems, size_problems
+from supervessel.scene.numbers import LARGEST_PLACE
 from supervessel.scene.schema import Scene, known_keys
 from supervessel.scene.variables import InputVariable
 from supervessel.shell.reading import ReadingError, read_toml
-
-LARGEST_PLACE = 1e100
-"""[m], [m/s]: squares and cubes of components up to this are doubles."""
 
 EXPECTED = {
     "dict_type": "a table",

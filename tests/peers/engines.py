@@ -218,11 +218,16 @@ def basilisk(integrator: str | None, tolerance: float | None = None) -> Callable
             raise InsteadError(f"refused: {error}") from error
         simulation.ConfigureStopTime(nano * body.steps)
         simulation.ExecuteSimulation()
-        sigma = np.array(craft.scStateOutMsg.read().sigma_BN)
-        square = sigma @ sigma
-        return np.array([1.0 - square, *(2.0 * sigma)] / (1.0 + square))
+        return basilisk_attitude(craft)
 
     return fly
+
+
+def basilisk_attitude(craft: Any) -> Array:
+    """Returns the attitude, (4,), of a Basilisk Spacecraft, which has modified Rodrigues parameters."""
+    sigma = np.array(craft.scStateOutMsg.read().sigma_BN)
+    square = sigma @ sigma
+    return np.array([1.0 - square, *(2.0 * sigma)] / (1.0 + square))
 
 
 OURS = {"exact": 1e-9, "auto": 1e-9, "taylor": 1e-15}

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from engines import Array
+from engines import Array, basilisk_attitude
 from ladder import Flight, Settings
 
 MOMENTS = (1.0, 2.0, 3.0)  # kg m2
@@ -232,9 +232,7 @@ def _basilisk(work: Work, step: float, integrator: str | None) -> Flight:
 
     def fly() -> Array:
         simulation.ExecuteSimulation()
-        sigma = np.array(craft.scStateOutMsg.read().sigma_BN)
-        square = sigma @ sigma
-        return np.array([1.0 - square, *(2.0 * sigma)] / (1.0 + square))
+        return basilisk_attitude(craft)
 
     return fly
 

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from engines import Array
+from engines import Array, basilisk_attitude
 from fmpy import extract, read_model_description
 from ladder import Flight, Judge, Ladder, Result, Settings
 from own import Built
@@ -243,9 +243,7 @@ def _basilisk(work: Work, step: float, integrator: str | None) -> Flight:
 
     def fly() -> Array:
         simulation.ExecuteSimulation()
-        sigma = np.array(craft.scStateOutMsg.read().sigma_BN)
-        square = sigma @ sigma
-        return np.array([1.0 - square, *(2.0 * sigma)] / (1.0 + square))
+        return basilisk_attitude(craft)
 
     return fly
 

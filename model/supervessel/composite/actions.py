@@ -3,13 +3,13 @@
 Root axes are the root vessel's; body axes have the same directions, with the origin at the barycentre.
 """
 
-from collections.abc import Callable, Mapping, Set
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
-from supervessel.composite.bodies import Lookup, placed_groups, vessel_body
+from supervessel.composite.bodies import Lookup, Placed, placed_vessels, vessel_body
 from supervessel.composite.inertia import Body, from_upper_triangle, offset_tensor, upper_triangle
 from supervessel.composite.poses import Pose, constant, from_anchor
 from supervessel.composite.resolved import ResolvedScene
@@ -19,10 +19,6 @@ from supervessel.rotation.attitude import quaternion, to_inertial
 from supervessel.scene.inputs import FORCE, TORQUE, WHEEL_TORQUE, InputKind, vessel_of
 from supervessel.scene.schema import Scene
 from supervessel.scene.variables import InputVariable
-
-Placed = Mapping[str, tuple[Pose, ca.SX | None]]
-"""Poses of vessels, whose origins are their anchors, in the root's axes, and whether they hang on the root
-(None: always)."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +86,7 @@ def action_parts(resolved: ResolvedScene, lookup: Lookup, centre: ca.SX) -> dict
     ]
     if not acting:
         return {}
-    where = _placed(resolved, lookup, {vessel_of(owner) for _, owner in acting})
+    where = placed_vessels(resolved, lookup, {vessel_of(owner) for _, owner in acting})
     found = [equation(resolved.scene, owner, where, centre) for equation, owner in acting]
     parts = {"moment": ca.vertcat(*(ca.vec(one.moment) for one in found))}
     forces = [ca.vec(one.force) for one in found if one.force is not None]
@@ -165,7 +161,7 @@ def vessel_parts(resolved: ResolvedScene, lookup: Lookup, whole: Body) -> dict[s
     """
     if not resolved.vessels_shown:
         return {}
-    where = _placed(resolved, lookup, set(resolved.vessels_shown))
+    where = placed_vessels(resolved, lookup, set(resolved.vessels_shown))
     parts = {}
     for name in resolved.vessels_shown:
         pose, attached = where[name]
@@ -230,14 +226,4 @@ def vessel_outputs(
         f"{name}.attitude": q_body_vessel,
         f"{name}.angular_velocity": R_body_vessel.T @ (omega + pieces["rate"]),
         f"{name}.angular_momentum": to_inertial(attitude, share),
-    }
-
-
-def _placed(resolved: ResolvedScene, lookup: Lookup, names: Set[str]) -> dict[str, tuple[Pose, ca.SX | None]]:
-    """Returns by name the poses of some vessels, root axes, and 1 while docked, else 0 (None: always)."""
-    return {
-        name: (group.pose_of(name), group.attached)
-        for group in placed_groups(resolved, lookup)
-        for name in group.inside
-        if name in names
     }

@@ -6,7 +6,7 @@ Source of poses and sums: [EQ] The assembly, eqs. (4) to (6); of motions: [EQ] W
 change, eq. (11).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from functools import cache
 
@@ -109,6 +109,21 @@ def placed_groups(resolved: ResolvedScene, lookup: Lookup) -> list[PlacedGroup]:
             holds, pose = _chosen(flags, poses)
             placed.append(PlacedGroup(pose, holds, group.inside))
     return placed
+
+
+Placed = Mapping[str, tuple[Pose, ca.SX | None]]
+"""Poses of vessels, whose origins are their anchors, in the root's axes; and 1 while a vessel hangs on the
+root, else 0 (None: always)."""
+
+
+def placed_vessels(resolved: ResolvedScene, lookup: Lookup, names: Set[str]) -> Placed:
+    """Returns some vessels by name, as inputs place them."""
+    return {
+        name: (group.pose_of(name), group.attached)
+        for group in placed_groups(resolved, lookup)
+        for name in group.inside
+        if name in names
+    }
 
 
 def _placing(resolved: ResolvedScene, lookup: Lookup) -> Callable[[Way], Pose]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from supervessel.composite.bodies import Lookup, placed_groups
+from supervessel.composite.bodies import Lookup, placed_vessels
 from supervessel.composite.inertia import Body, symmetric
 from supervessel.composite.poses import Pose, constant, scaled
 from supervessel.composite.resolved import ResolvedScene
@@ -88,13 +88,7 @@ def placed_wheels(resolved: ResolvedScene, lookup: Lookup) -> WheelAxes | None:
     scene = resolved.scene
     if not scene.wheels:
         return None
-    home = {vessel_of(name) for name in scene.wheels}
-    where = {
-        vessel: (group.pose_of(vessel), group.attached)
-        for group in placed_groups(resolved, lookup)
-        for vessel in group.inside
-        if vessel in home
-    }
+    where = placed_vessels(resolved, lookup, {vessel_of(name) for name in scene.wheels})
     return _stacked(scene, scene.wheels, [where[vessel_of(name)] for name in scene.wheels])
 
 

@@ -24,9 +24,12 @@ def attitude_dot(attitude: ca.SX, angular_velocity: ca.SX) -> ca.SX:
     )
 
 
-def unit(quaternion: ca.SX) -> ca.SX:
-    """Returns the quaternion, (4,), at length 1. The square of its length must be an ordinary double."""
-    return quaternion / ca.sqrt(ca.sumsqr(quaternion))
+def unit(vector: ca.SX) -> ca.SX:
+    """Returns a quaternion, (4,), or a vector, (3,), at length 1.
+
+    The square of its length must be an ordinary double.
+    """
+    return vector / ca.sqrt(ca.sumsqr(vector))
 
 
 def to_inertial(attitude: ca.SX, vector_body: ca.SX) -> ca.SX:

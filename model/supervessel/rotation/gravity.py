@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import casadi as ca
 
 from supervessel.composite.inertia import from_upper_triangle
-from supervessel.rotation.attitude import to_body
+from supervessel.rotation.attitude import to_body, unit
 from supervessel.rotation.laws import LAWS, MIXED_PRODUCTS, SQUARES, RotationLaw, gyroscopic_torque
 from supervessel.rotation.lengths import smooth_length
 
@@ -44,7 +44,7 @@ class Field:
         attitude : q_inertial_body, (4,), of any length: only the direction of r in body axes counts
         position : r, (3,) [m], inertial axes
         """
-        direction = unit_vector(to_body(attitude, position))
+        direction = unit(to_body(attitude, position))
         return -strength(self.mu, position) * (gyroscopic_torque(self.inertia) @ products_of(direction))
 
     def rate(self, motion: ca.SX) -> ca.SX:
@@ -91,11 +91,6 @@ def strength(mu: float, position: ca.SX) -> ca.SX:
     """Returns 3 mu/|r|^3 [1/s2]; position : r, (3,) [m]."""
     square = ca.sumsqr(position)
     return (3.0 * mu / square) / ca.sqrt(square)
-
-
-def unit_vector(vector: ca.SX) -> ca.SX:
-    """Returns a vector, (3,), at length 1; the square of its length must be an ordinary double."""
-    return vector / ca.sqrt(ca.sumsqr(vector))
 
 
 def products_of(vector: ca.SX) -> ca.SX:

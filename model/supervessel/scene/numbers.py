@@ -171,6 +171,8 @@ Direction = Annotated[
 ]  # validators run from the right
 Velocity = Annotated[Vector, vector("m/s", "three finite numbers")]
 Mu = Annotated[float, number("m3/s2", "a finite number > 0", 0.0, open_low=True)]
+LARGEST_PLACE = 1e100
+"""[m], [m/s], in a field of gravity: squares and cubes of components up to this are doubles."""
 WheelInertia = Annotated[float, number("kg m2", "a finite number >= 0", 0.0)]
 LARGEST_MOMENTUM = 1e100
 """Of a wheel [N m s], either way: what it does to a rate is a double."""

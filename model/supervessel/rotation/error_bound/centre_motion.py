@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from supervessel.rotation.attitude import to_body
-from supervessel.rotation.gravity import Field, strength, unit_vector
+from supervessel.rotation.attitude import to_body, unit
+from supervessel.rotation.gravity import Field, strength
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def centre_motion(field: Field, attitude: ca.SX, step: ca.SX) -> CentreMotion:
     pace = ca.fmax(speed, fall_rate)
     return CentreMotion(
         known=known,
-        direction=unit_vector(to_body(attitude, position)),
+        direction=unit(to_body(attitude, position)),
         strength=at_start,
         strongest=SLACK * at_start / cube,
         change=SLACK * at_start * ca.fmax(increase, 3.0 * farther),
