@@ -3,6 +3,7 @@
 import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -150,3 +151,44 @@ def said_by(program):
         [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False
     )
     return done.returncode, done.stderr
+
+
+LATE = """\
+import os, signal, sys, tempfile, threading, time
+from supervessel.shell import ending
+
+folder, about_to, never = sys.argv[1], threading.Event(), threading.Event()
+
+def makes_late(event, arguments):
+    # comes after the hook of `ending`: the thread waits in the call that makes the file
+    if event == "open" and str(arguments[0]).startswith(folder):
+        about_to.set()
+        never.wait(0.2)
+
+def interrupts():
+    about_to.wait()
+    os.kill(os.getpid(), signal.SIGTERM)
+
+def main():
+    sys.addaudithook(makes_late)
+    os.set_blocking(2, False)  # nobody reads: what the command says at its end has to wait
+    try:
+        while True:
+            os.write(2, b"." * 4096)
+    except BlockingIOError:
+        os.set_blocking(2, True)
+    threading.Thread(target=interrupts, daemon=True).start()
+    threading.Thread(target=tempfile.mkstemp, kwargs={"dir": folder}, daemon=True).start()
+    time.sleep(10.0)
+
+ending.run_as_process(main)
+"""
+
+
+def test_a_file_that_a_thread_is_just_making_when_the_command_ends_does_not_stay(tmp_path):
+    (tmp_path / "made").mkdir()
+    running = subprocess.Popen([sys.executable, "-c", LATE, tmp_path / "made"], stderr=subprocess.PIPE)
+    time.sleep(1.5)
+    _, said = running.communicate(timeout=30)
+    assert (running.returncode, said.splitlines()[-1].endswith(b"interrupted")) == (143, True)
+    assert list((tmp_path / "made").iterdir()) == []

@@ -12,12 +12,16 @@ import errno
 import os
 import signal
 import sys
+import time
 from _thread import RLock, get_ident
 from collections.abc import Callable
 from contextlib import suppress
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 """Ctrl-C, the usual way to end a program, and a terminal that is closed; Windows has no SIGHUP."""
+
+MADE_WITHIN = 0.5
+"""Seconds that are waited for what threads are just making: a busy system lets them wait in that call."""
 
 ROUNDS = 20
 """How often temporary files are removed, until all are gone: a program that ends may still add some."""
@@ -33,6 +37,7 @@ _blocks: list[None] = []  # one for each uninterrupted block that the main threa
 _heard: list[int] = []  # signals that have told the command to end: the first only
 _note = ""
 _temporary: set[str] = set()
+_making: dict[int, str] = {}  # by thread, the temporary file or folder that it is about to make
 _ended = False
 
 
@@ -103,6 +108,7 @@ def _end() -> None:
         _ended = True
         for act in before_end:
             _quietly(act)
+        _wait_for_made()
         for _ in range(ROUNDS):
             if not [path for path in tuple(_temporary) if not _remove(path)]:
                 break
@@ -113,15 +119,30 @@ def _end() -> None:
         os._exit(128 + _heard[0])
 
 
+def _wait_for_made() -> None:
+    """Waits until what other threads are about to make is there: it is removed only then."""
+    until = time.monotonic() + MADE_WITHIN
+    while time.monotonic() < until:
+        others = [path for thread, path in tuple(_making.items()) if thread != _main_thread]
+        if all(map(os.path.lexists, others)):
+            return
+        time.sleep(0.001)
+
+
 def _watch(event: str, arguments: tuple[object, ...]) -> None:
     """Keeps the names of temporary files and folders, of which Python tells before it makes them.
 
     When the command ends, other threads stop here at their next step into the system: they make nothing new.
     """
-    if _ended and get_ident() != _main_thread:
+    thread = get_ident()
+    if _making and not (event in ("open", "os.mkdir") and arguments[0] == _making.get(thread)):
+        _making.pop(thread, None)  # whatever comes next, it has been made
+    if _ended and thread != _main_thread:
+        _making.pop(thread, None)
         busy.acquire()
     if event in ("tempfile.mkdtemp", "tempfile.mkstemp"):
-        _temporary.add(os.fsdecode(arguments[0]))  # type: ignore[arg-type]
+        _making[thread] = path = os.fsdecode(arguments[0])  # type: ignore[arg-type]
+        _temporary.add(path)
 
 
 def _remove(path: str) -> bool:
