@@ -233,6 +233,7 @@ Status derivatives_of_time(Instance *instance, const unsigned references[], size
     Variation *v = &instance->scratch.variation;
     memset(v, 0, sizeof *v);
     memcpy(v->x, rates, sizeof rates);
+    field_vary(instance, &v->inputs[INPUT_P_COUNT + INPUT_K_COUNT]);
     respond(instance, instance_is_ordinary(instance) && are_within(v->x, STATE_COUNT, ORDINARY));
     for (size_t i = 0; i < count; i++) values[i] = v->y[references[i] - REFERENCE_OUTPUTS];
     return check_results(instance, references, count, values);

@@ -1,15 +1,20 @@
 /* Where the body is in a field of gravity: judged, and followed within a communication step, along which the centre moves
-   by two-body motion from what the inputs say at its start. Without a field nothing of this is there.
+   by two-body motion from what the inputs say at its start. At the end of the step it is where it has moved to, until
+   a place is set: what is read there is that of the end. Without a field nothing of this is there.
 
-   Of the instance it owns acting, moved, left and moves. */
+   Of the instance it owns acting, moved, left and moves, and of Dynamics place and place_holds. */
 #ifndef FIELD_H
 #define FIELD_H
 
+#include <math.h>
 #include <string.h>
 
 #include "instance.h"
 
 #if FIELD
+
+/* m: the inverse of its square is an ordinary number. */
+static const double FARTHER = 0x1p-60;
 
 /* Judges position and velocity, the composite being current. */
 Status field_check(Instance *instance);
@@ -26,6 +31,31 @@ static inline void field_begin(Instance *instance) {
 }
 static inline void field_end(Instance *instance) {
     instance->moves = false;
+}
+
+/* The step is taken: the centre is where it has moved to. */
+static inline void field_arrive(Instance *instance) {
+    memcpy(instance->now.place, field_of(instance), sizeof instance->now.place);
+    instance->now.place_holds = true;
+}
+
+/* The centre is where the inputs say, if one of them has been set that says it. */
+static inline void field_set(Instance *instance, size_t reference) {
+    if (reference < REFERENCE_TORQUE + FIELD_PLACE || reference >= REFERENCE_TORQUE + FIELD_PLACE + 6) return;
+    if (instance->now.place_holds) instance->outputs_are_current = instance->rates_are_current = false;
+    instance->now.place_holds = false;
+}
+
+/* Writes the rate of the place among those of the inputs u; no output follows from the velocity. */
+static inline void field_vary(const Instance *instance, double rates[INPUT_U_COUNT]) {
+    const double *set = &instance->now.values[REFERENCE_TORQUE + FIELD_PLACE];
+    memcpy(&rates[FIELD_PLACE], (instance->now.place_holds ? instance->now.place : set) + 3, 3 * sizeof(double));
+}
+
+/* Whether the distance is no number that overflows when something is divided by its powers. */
+static inline bool field_is_ordinary(const Instance *instance) {
+    const double *r = &instance->now.values[REFERENCE_TORQUE + FIELD_PLACE];
+    return fabs(r[0]) >= FARTHER || fabs(r[1]) >= FARTHER || fabs(r[2]) >= FARTHER;
 }
 
 /* Has the model's step write where the centre is afterwards; once the step is taken, field_move goes on to there. */
@@ -48,6 +78,19 @@ static inline void field_begin(Instance *instance) {
 }
 static inline void field_end(Instance *instance) {
     (void)instance;
+}
+static inline void field_arrive(Instance *instance) {
+    (void)instance;
+}
+static inline void field_set(Instance *instance, size_t reference) {
+    (void)instance, (void)reference;
+}
+static inline void field_vary(const Instance *instance, double rates[]) {
+    (void)instance, (void)rates;
+}
+static inline bool field_is_ordinary(const Instance *instance) {
+    (void)instance;
+    return true;
 }
 static inline void field_result(Instance *instance) {
     (void)instance;

@@ -37,6 +37,7 @@
 #include <fenv.h>
 #include <stdbool.h>
 #include <stddef.h>
+#include <string.h>
 
 #include "scene.h"
 
@@ -130,6 +131,10 @@ typedef struct {
     double epoch[STATE_COUNT];        /* the state that free motion is counted from */
     double elapsed, elapsed_rest;     /* s since then, as an unevaluated sum */
     double from_epoch[FREE_START];    /* what free_at needs of the epoch, if epoch_step is EPOCH_SERVED */
+#if FIELD
+    double place[6];                  /* m, m/s: where the last communication step has brought the centre */
+    unsigned place_holds;             /* the centre is there: no place has been set since */
+#endif
     unsigned state;                   /* a State */
     unsigned model_exchange;          /* else co-simulation */
     unsigned ended_in;                /* the State before TERMINATED */
@@ -169,7 +174,7 @@ struct Instance {
     int iw[WORK_INT];
     double w[WORK_REAL];
 #if FIELD
-    double acting[INPUT_U_COUNT];     /* the inputs u within a communication step, see field.h */
+    double acting[INPUT_U_COUNT];     /* the inputs u with a place that has moved, see field.h */
     double moved[6];                  /* m, m/s: where a sub-step ends, before it is taken */
     double left[6];                   /* where the last one began */
     bool moves;                       /* the model is given `acting` */
@@ -247,13 +252,22 @@ static inline void instance_state_moved(Instance *instance) {
     if (STATE_IS_MOMENTUM) instance->mirror_is_current = false;
 }
 
+#if FIELD
+/* Gives the model the inputs u as they are, with the place that the centre has come to. */
+static inline void instance_act_at_place(Instance *instance) {
+    memcpy(instance->acting, &instance->now.values[REFERENCE_TORQUE], sizeof instance->acting);
+    memcpy(&instance->acting[FIELD_PLACE], instance->now.place, sizeof instance->now.place);
+}
+#endif
+
 /* Points the first arguments of the model's functions to x, u, c, a, and the errors. Of ode and response the first
    one is the states instead. */
 static inline void instance_set_arguments(Instance *instance) {
     instance->arg[0] = instance_x(instance);
     instance->arg[1] = &instance->now.values[REFERENCE_TORQUE];
 #if FIELD
-    if (instance->moves) instance->arg[1] = instance->acting;
+    if (instance->now.place_holds && !instance->moves) instance_act_at_place(instance);
+    if (instance->now.place_holds || instance->moves) instance->arg[1] = instance->acting;
 #endif
     instance->arg[2] = instance->now.c;
     instance->arg[3] = instance->now.a;

@@ -134,6 +134,7 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
             progress.remaining = end - now->values[REFERENCE_TIME];
         }
     }
+    field_arrive(instance);
     field_end(instance);
     now->epoch_holds = progress.was_free;
     memcpy(now->stepped_p, now->p, sizeof now->p);

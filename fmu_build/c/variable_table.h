@@ -26,7 +26,8 @@ enum {
     FOLLOWS_ATTITUDE = 4, /* the attitude among the states */
     FOLLOWS_OUTPUTS = 8,
     FOLLOWS_RATES = 16,
-    FOLLOWS_AXES = 32
+    FOLLOWS_AXES = 32,
+    FOLLOWS_FIELD = 64 /* where the body is in a field of gravity */
 };
 
 typedef struct {

@@ -54,7 +54,7 @@ bool are_within(const double numbers[], size_t count, double limit) {
 bool instance_is_ordinary(Instance *instance) {
     return instance->now.composite_is_ordinary && are_within(instance_x(instance), STATE_COUNT, ORDINARY) &&
            (!STATE_IS_MOMENTUM || are_within(instance_states(instance), STATE_COUNT, ORDINARY)) &&
-           are_within(&instance->now.values[REFERENCE_TORQUE], INPUT_U_COUNT, ORDINARY);
+           are_within(&instance->now.values[REFERENCE_TORQUE], INPUT_U_COUNT, ORDINARY) && field_is_ordinary(instance);
 }
 
 static Status refresh_outputs(Instance *instance) {
@@ -89,6 +89,7 @@ static Status prepare(Instance *instance, unsigned wanted) {
     if (status == STATUS_OK && (wanted & FOLLOWS_COMPOSITE)) status = composite_refresh(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_STATES)) changes_mirror(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_AXES)) composite_refresh_axes(instance);
+    if (status == STATUS_OK && (wanted & FOLLOWS_FIELD)) status = field_check(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_OUTPUTS)) status = refresh_outputs(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_RATES)) status = field_check(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_RATES)) status = motors_check(instance);
@@ -204,6 +205,7 @@ Status instance_set(Instance *instance, const unsigned references[], size_t coun
     bool changed = false, shape_changed = false;
     for (size_t i = 0; i < count; i++) {
         double *value = &instance->now.values[references[i]];
+        field_set(instance, references[i]);
         if (*value == values[i] || is_guess(instance, references[i])) continue;
         *value = values[i];
         changed = true;

@@ -42,6 +42,8 @@ def _needs(entry: TableEntry, changing: bool) -> frozenset[str]:
         return frozenset({"STATES", "COMPOSITE"} if changing else {"STATES"})
     if isinstance(entry.variable, InputVariable) and entry.variable.part == "shape":
         return frozenset({"COMPOSITE"})
+    if isinstance(entry.variable, InputVariable) and entry.variable.part == "field":
+        return frozenset({"COMPOSITE", "FIELD"})  # it is judged beside the composite's size
     return frozenset()
 
 

@@ -31,6 +31,7 @@ UNITS = {
     "kg": Unit({"kg": 1}, "Mass", "Mass"),
     "m": Unit({"m": 1}, "Length", "Length"),
     "m/s": Unit({"m": 1, "s": -1}, "Velocity", "Velocity"),
+    "m/s2": Unit({"m": 1, "s": -2}, "Acceleration", "Acceleration"),
     "m2": Unit({"m": 2}, "SpecificMoment", "MassNormalisedMomentOfInertia"),
     "rad": Unit({"rad": 1}, "Angle", "Angle", ("deg", degrees(1.0))),
     "rad/s": Unit({"s": -1, "rad": 1}, "AngularVelocity", "AngularVelocity", ("deg/s", degrees(1.0))),

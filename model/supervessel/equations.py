@@ -189,7 +189,7 @@ def equations(scene: Scene) -> Equations:
     def outputs_from(state: ca.SX) -> ca.SX:
         shown = a[axes.slices["principal"]] if "principal" in axes.slices else ca.SX.zeros(7)
         of_steps = {"error_estimate": e[0], "error_bound": e[1]}
-        return outputs_of(resolved, state, u, parts | {"principal": shown} | of_steps)
+        return outputs_of(resolved, state, u, parts | {"principal": shown} | of_steps, dynamics)
 
     axes_change = axes_derivative(dynamics.inertia, c, a, axes.slices)
     return Equations(

@@ -8,6 +8,8 @@ import casadi as ca
 
 from supervessel.composite.actions import net_force, vessel_outputs
 from supervessel.composite.inertia import from_upper_triangle
+from supervessel.composite.loads import load_outputs
+from supervessel.composite.points import Motion, SpunBeside, Tide, point_outputs
 from supervessel.composite.resolved import ResolvedScene
 from supervessel.composite.wheels import (
     WheelAxes,
@@ -16,7 +18,9 @@ from supervessel.composite.wheels import (
     momentum_of_vessel,
     wheel_outputs,
 )
-from supervessel.rotation.attitude import to_inertial, unit
+from supervessel.rotation.attitude import to_body, to_inertial, unit
+from supervessel.rotation.dynamics import Dynamics
+from supervessel.rotation.gravity import strength
 
 
 @dataclass(frozen=True)
@@ -26,12 +30,13 @@ class Known:
     resolved : the scene
     attitude : q_inertial_body, (4,), of unit length
     omega    : angular velocity, (3,) [rad/s], body axes
-    u        : the inputs that act, (m,) [N m, N]
+    u        : the inputs that torques follow from, (m,)
     parts    : by name, the parts of c, see `composite.parts`; "principal", the part of a, (7,), zeros where
                no output shows it; "error_estimate" and "error_bound" [rad]
     inertia  : J about the barycentre, (3, 3) [kg m2], body axes
     wheels   : see `composite.wheels`; None where there are none
     stored   : momentum of each wheel, (n,) [N m s]
+    dynamics : the equation of rotation
     """
 
     resolved: ResolvedScene
@@ -42,6 +47,28 @@ class Known:
     inertia: ca.SX
     wheels: WheelAxes | None
     stored: ca.SX
+    dynamics: Dynamics
+
+    @cached_property
+    def motion(self) -> Motion:
+        """How the body moves at the instant."""
+        state = ca.vertcat(self.attitude, self.omega, self.stored)
+        alpha = self.dynamics.state_rate(state)[4:7]
+        linear = net_force(self.resolved, self.parts, self.u) / self.parts["mass"]
+        return Motion(self.omega, alpha, linear, self._tide, self._spun)
+
+    @property
+    def _tide(self) -> Tide | None:
+        field = self.dynamics.field
+        if field is None:
+            return None
+        place = field.start[:3]
+        return Tide(strength(field.mu, place) / 3.0, unit(to_body(self.attitude, place)))
+
+    @property
+    def _spun(self) -> SpunBeside | None:
+        spun = self.dynamics.wheels
+        return None if spun is None else SpunBeside(spun.axes.inertias, spun.motors, self.stored)
 
     @cached_property
     def turned(self) -> ca.SX:
@@ -73,28 +100,35 @@ EXPRESSIONS: dict[str, Callable[[Known], ca.SX]] = {
     "error_bound": lambda known: known.parts["error_bound"],
     "net_force": lambda known: net_force(known.resolved, known.parts, known.u),
 }
-"""By name of an output of the whole, its expression; `composite.actions.vessel_outputs` has those of vessels.
+"""By name of an output of the whole, its expression; `composite` has those of vessels, wheels, points, docks.
 
 `scene.outputs` says units and axes.
 """
 
 
-def outputs_of(resolved: ResolvedScene, x: ca.SX, u: ca.SX, parts: Mapping[str, ca.SX]) -> ca.SX:
+def outputs_of(
+    resolved: ResolvedScene, x: ca.SX, u: ca.SX, parts: Mapping[str, ca.SX], dynamics: Dynamics
+) -> ca.SX:
     """Returns the scene's outputs in its order, y, (n,).
 
-    x     : attitude q_inertial_body, angular velocity [rad/s], body axes, and momenta of wheels [N m s]
-    u     : the inputs that act, (m,) [N m, N]
-    parts : see `Known`
+    x        : attitude q_inertial_body, angular velocity [rad/s], body axes, and momenta of wheels [N m s]
+    u        : the inputs that torques follow from, (m,)
+    parts    : see `Known`
+    dynamics : the equation of rotation, in terms of `u` and `parts`
     The attitude is brought to unit length here: as a state it keeps its length only as accurately as it is
     integrated.
     """
     attitude, omega, stored, wheels = unit(x[:4]), x[4:7], x[7:], axes_of(resolved, parts)
     inertia = from_upper_triangle(parts["inertia"])
-    known = Known(resolved, attitude, omega, u, parts, inertia, wheels, stored)
+    known = Known(resolved, attitude, omega, u, parts, inertia, wheels, stored, dynamics)
     of_owners = {} if wheels is None else wheel_outputs(resolved, wheels, omega, stored)
     for name in resolved.vessels_shown:
         held = momentum_of_vessel(resolved.scene, wheels, name, stored)
         of_owners |= vessel_outputs(name, parts[f".{name}"], attitude, omega, held)
+    for name in resolved.points_shown:
+        of_owners |= point_outputs(name, parts[f".{name}"], known.motion)
+    for name in resolved.docks_shown:
+        of_owners |= load_outputs(resolved, name, parts[f".{name}"], u, known.motion)
     shown = (
         of_owners[group] if group in of_owners else EXPRESSIONS[group](known)
         for group in resolved.scene.outputs.names

@@ -115,6 +115,11 @@ class Place:
         self._start()
         if not self.initialising:
             self._bring(interface, kinds)
+        if (
+            self.scene.inputs.gravity
+        ):  # derivatives are by the inputs, which a place that has moved on is none of
+            names = [f"gravity.{key}" for key in ("position", "velocity")]
+            assert self.instance.set({name: self.instance.get(name) for name in names}) == OK
         self._sort()
         self.instance.log.clear()
         fmu = self.instance.fmu

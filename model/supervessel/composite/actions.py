@@ -3,7 +3,7 @@
 Root axes are the root vessel's; body axes have the same directions, with the origin at the barycentre.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass
 
 import casadi as ca
@@ -34,9 +34,14 @@ class Acting:
     moment: ca.SX
     force: ca.SX | None = None
 
+    @property
+    def matrices(self) -> tuple[ca.SX, ...]:
+        """Those that there are."""
+        return (self.moment,) if self.force is None else (self.moment, self.force)
+
 
 def _at_point(scene: Scene, name: str, where: Placed, centre: ca.SX) -> Acting:
-    """Returns the matrices of a force at the point called "vessel.point"."""
+    """Returns the matrices of a force at the point called "vessel.point", for the moment about `centre`."""
     pose, attached = where[vessel_of(name)]
     position = from_anchor(scene, vessel_of(name), scene.point(name).position)
     arm = pose.origin + pose.rotation @ constant(position) - centre
@@ -90,9 +95,42 @@ def action_parts(resolved: ResolvedScene, lookup: Lookup, centre: ca.SX) -> dict
     found = [equation(resolved.scene, owner, where, centre) for equation, owner in acting]
     parts = {"moment": ca.vertcat(*(ca.vec(one.moment) for one in found))}
     forces = [ca.vec(one.force) for one in found if one.force is not None]
-    if "net_force" in resolved.scene.outputs.names and forces:
+    if resolved.shows_forces and forces:
         parts["force"] = ca.vertcat(*forces)
     return parts
+
+
+def acting_on(resolved: ResolvedScene, vessels: Set[str]) -> list[tuple[int, bool]]:
+    """Returns the place in u of each force or torque on one of these vessels, and whether it is a force."""
+    return [(place, variable.kind is FORCE) for place, variable in _on_vessels(resolved, vessels)]
+
+
+def acting_about(
+    resolved: ResolvedScene, where: Placed, about: ca.SX, vessels: Set[str]
+) -> list[tuple[str, Acting]]:
+    """Returns vessel and matrices of each force or torque on one of these vessels, in the order of
+    `acting_on`.
+
+    where : the poses of the vessels
+    about : the point that moments are taken about, (3,) [m], root axes, from the root's anchor
+    """
+    found = []
+    for _, variable in _on_vessels(resolved, vessels):
+        equation = equation_of(variable.kind)
+        assert equation is not None
+        acting = equation(resolved.scene, variable.owner, where, about)
+        found.append((vessel_of(variable.owner), acting))
+    return found
+
+
+def _on_vessels(resolved: ResolvedScene, vessels: Set[str]) -> list[tuple[int, InputVariable]]:
+    """Returns what acts on some vessels, as `_acting` does; a torque about the barycentre acts on the root
+    and is none."""
+    return [
+        (place, variable)
+        for place, variable in _acting(resolved)
+        if vessel_of(variable.owner) in vessels and equation_of(variable.kind) is not None
+    ]
 
 
 def _acting(resolved: ResolvedScene) -> list[tuple[int, InputVariable]]:

@@ -75,14 +75,25 @@ def composite_body(resolved: ResolvedScene, lookup: Lookup) -> Body:
     for number, (group, placed) in enumerate(
         zip(resolved.groups, placed_groups(resolved, lookup), strict=True)
     ):
-        lumped = _lumped(resolved.scene, group, lookup)
-        if number > 0:
-            pose = placed.pose
-            lumped = [b.seen_from(pose.rotation, pose.origin, pose.velocity, pose.rate) for b in lumped]
+        lumped = group_bodies(resolved, number, group, placed, lookup)
         if placed.attached is not None:
             lumped = [body.times(placed.attached) for body in lumped]
         bodies += lumped
     return by_convention(resolved.scene, combine(bodies))
+
+
+def group_bodies(
+    resolved: ResolvedScene, number: int, group: RigidGroup, placed: PlacedGroup, lookup: Lookup
+) -> list[Body]:
+    """Returns a rigid group, or some of its vessels, as bodies in root axes, as if docks held it there.
+
+    number : of the group; the root's own, 0, has root axes
+    """
+    lumped = _lumped(resolved.scene, group, lookup)
+    if number == 0:
+        return lumped
+    pose = placed.pose
+    return [b.seen_from(pose.rotation, pose.origin, pose.velocity, pose.rate) for b in lumped]
 
 
 def by_convention(scene: Scene, whole: Body) -> Body:
@@ -124,6 +135,24 @@ def placed_vessels(resolved: ResolvedScene, lookup: Lookup, names: Set[str]) -> 
         for name in group.inside
         if name in names
     }
+
+
+def way_holds(way: Way, resolved: ResolvedScene, lookup: Lookup) -> ca.SX | None:
+    """Returns 1 where a way holds its group, else 0; None where it always does.
+
+    Beside a way that always holds no other can: it is then never said to.
+    """
+    flag, others = _all_true(way, lookup), resolved.groups[way.group].ways
+    if flag is not None and any(_all_true(other, lookup) is None for other in others):
+        return ca.SX(0.0)
+    return flag
+
+
+def port_place(scene: Scene, name: str, where: Placed, lookup: Lookup) -> ca.SX:
+    """Returns where the port called "vessel.port" is, (3,) [m], root axes, from the root's anchor."""
+    pose, _ = where[vessel_of(name)]
+    position, _ = _port(scene, name, lookup)
+    return pose.origin + pose.rotation @ position
 
 
 def _placing(resolved: ResolvedScene, lookup: Lookup) -> Callable[[Way], Pose]:

@@ -1,7 +1,7 @@
 """The docks of a scene as a graph: rigid groups of vessels, and the ways by which they hang on the root."""
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from supervessel.scene.inputs import part_of
@@ -80,6 +80,25 @@ class Way:
         """Whether the way leads over or to a group, given by its number."""
         return any(way.group == group for way in self._backwards())
 
+    @property
+    def legs(self) -> list[tuple[int, str, str | None]]:
+        """The groups on the way, from the root's on: number, vessel where the way comes in, and where it
+        leaves.
+
+        The way comes into the root's own group nowhere, "", and leaves its last group nowhere, None.
+        """
+        leaves: str | None = None
+        legs = []
+        for way in self._backwards():
+            legs.append((way.group, way.joint.child if way.joint else "", leaves))
+            leaves = way.joint.parent if way.joint else None
+        return legs[::-1]
+
+    @property
+    def joints(self) -> list[Joint]:
+        """The joints between the groups on the way, from the root on."""
+        return [way.joint for way in self._backwards() if way.joint is not None][::-1]
+
     def _backwards(self) -> "Iterator[Way]":
         """Yields this way, then those before it."""
         way: Way | None = self
@@ -138,6 +157,79 @@ def ways(scene: Scene, parts: Sequence[VesselGroup]) -> list[list[Way]]:
                 if not way.passes(group):
                     waiting.append(Way(group, joint, way))
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class Crossing:
+    """A way that leads over a dock.
+
+    way      : the way
+    vessels  : of the group at its end, those beyond the dock
+    forwards : whether it leads from the dock's first port to its second one
+    """
+
+    way: Way
+    vessels: frozenset[str]
+    forwards: bool
+
+
+def crossings(scene: Scene, dock: Dock, hanging: Iterable[Sequence[Way]]) -> list[Crossing]:
+    """Returns the ways that lead over a dock, with the vessels beyond it.
+
+    hanging : of each group, the ways by which it may hang on the root
+    """
+    parts, first = groups(scene), part_of(dock.ports[0])[0]
+    cut, every_way = _cut(parts, dock), [way for own in hanging for way in own]
+    if cut is None:
+        return [
+            Crossing(way, frozenset(parts[way.group].vessels), joint.parent == first)
+            for way in every_way
+            for joint in way.joints
+            if set(joint.ports) == set(dock.ports)
+        ]
+    found = (_over_cut(scene, parts, cut, way, first in cut.beyond) for way in every_way)
+    return [crossing for crossing in found if crossing is not None]
+
+
+def _over_cut(
+    scene: Scene, parts: Sequence[VesselGroup], cut: "_Cut", way: Way, first_is_beyond: bool
+) -> Crossing | None:
+    """Returns how a way leads over a dock inside a rigid group, None where it does not.
+
+    first_is_beyond : whether the vessel of the dock's first port is in `cut.beyond`
+    """
+    everyone = frozenset(parts[way.group].vessels)
+    for group, comes_in, leaves in way.legs:
+        if group != cut.group:
+            continue
+        begins_beyond = (comes_in or scene.root) in cut.beyond
+        forwards = begins_beyond is first_is_beyond
+        if leaves is None:
+            far = everyone - cut.beyond if begins_beyond else everyone & cut.beyond
+            return Crossing(way, far, forwards)
+        if (leaves in cut.beyond) is not begins_beyond:
+            return Crossing(way, everyone, forwards)
+    return None
+
+
+@dataclass(frozen=True)
+class _Cut:
+    """A dock inside a rigid group: the group's number, and its vessels on one side of the dock."""
+
+    group: int
+    beyond: frozenset[str]
+
+
+def _cut(parts: Sequence[VesselGroup], dock: Dock) -> _Cut | None:
+    """Returns where a dock cuts a rigid group in two; None: it joins two groups."""
+    for number, part in enumerate(parts):
+        beyond: set[str] = set()
+        for joint in part.joints:  # parents first
+            if set(joint.ports) == set(dock.ports) or joint.parent in beyond:
+                beyond.add(joint.child)
+        if beyond:
+            return _Cut(number, frozenset(beyond))
+    return None
 
 
 def switchable(scene: Scene, dock: Dock) -> bool:

@@ -3,7 +3,7 @@
 Code that comes after the reading of a scene takes all this from here, and only numbers from the scene itself.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supervessel.composite.constants import Places, constant_and_varying, lump, places
-from supervessel.composite.docks import VesselGroup, Way, groups, ways
+from supervessel.composite.docks import Crossing, VesselGroup, Way, crossings, groups, ways
 from supervessel.scene.inputs import Change
-from supervessel.scene.outputs import OutputKind, output_kind
+from supervessel.scene.outputs import OutputKind, OutputOwner, output_kind
 from supervessel.scene.reuse import reused
 from supervessel.scene.schema import Scene
 from supervessel.scene.variables import (
@@ -129,8 +129,32 @@ class ResolvedScene:
     @cached_property
     def vessels_shown(self) -> tuple[str, ...]:
         """The vessels that outputs are about, in the scene's order."""
-        shown = {vessel for _, vessel in self.output_kinds}
-        return tuple(vessel for vessel in self.scene.vessels if vessel in shown)
+        return tuple(vessel for vessel in self.scene.vessels if vessel in self._owners("vessel"))
+
+    @cached_property
+    def docks_shown(self) -> tuple[str, ...]:
+        """The docks that outputs are about, in the scene's order."""
+        shown = self._owners("dock")
+        return tuple(dock.name for dock in self.scene.docks if dock.name is not None and dock.name in shown)
+
+    @cached_property
+    def points_shown(self) -> tuple[str, ...]:
+        """The points "vessel.point" that outputs are about, in the order in which outputs name them first."""
+        return tuple(self._owners("point"))
+
+    @cached_property
+    def shows_forces(self) -> bool:
+        """Whether outputs follow from the sum of the forces."""
+        return any(kind.name == "net_force" or kind.accelerated for kind, _ in self.output_kinds)
+
+    @cached_property
+    def shows_field(self) -> bool:
+        """Whether outputs follow from the place in a field of gravity."""
+        return bool(self.field) and any(kind.accelerated for kind, _ in self.output_kinds)
+
+    def _owners(self, owner: OutputOwner) -> dict[str, None]:
+        """Returns the names of the owners of that kind that have outputs, each once."""
+        return dict.fromkeys(name for kind, name in self.output_kinds if kind.owner == owner)
 
     @cached_property
     def groups(self) -> tuple[RigidGroup, ...]:
@@ -147,10 +171,33 @@ class ResolvedScene:
         """By vessel, its rigid group."""
         return {vessel: group for group in self.groups for vessel in group.inside}
 
+    @cached_property
+    def crossings(self) -> Mapping[str, tuple[Crossing, ...]]:
+        """By dock that outputs are about, the ways that lead over it."""
+        hanging = [group.ways for group in self.groups]
+        return {
+            name: tuple(crossings(self.scene, self.scene.dock(name), hanging)) for name in self.docks_shown
+        }
+
+    def beyond(self, dock: str) -> frozenset[str]:
+        """Returns the vessels that are beyond a dock, seen from the root, by some way over it."""
+        return frozenset[str]().union(*(crossing.vessels for crossing in self.crossings[dock]))
+
+    def part_of_group(self, number: int, vessels: Set[str]) -> RigidGroup:
+        """Returns some vessels of a group as a group with its axes and ways."""
+        group = self.groups[number]
+        if vessels == group.inside.keys():
+            return group
+        inside = {name: pose for name, pose in group.inside.items() if name in vessels}
+        return self._lumped(group.reference, inside, group.ways)
+
     def _group(self, graph: VesselGroup, inside: Places, hanging: list[Way]) -> RigidGroup:
+        return self._lumped(graph.reference, inside, tuple(hanging))
+
+    def _lumped(self, reference: str, inside: Places, hanging: tuple[Way, ...]) -> RigidGroup:
         constants, varying = constant_and_varying(self.scene, inside)
         fixed = lump(self.scene, {name: inside[name] for name in constants}) if constants else None
-        return RigidGroup(graph.reference, inside, tuple(hanging), fixed, tuple(varying))
+        return RigidGroup(reference, inside, hanging, fixed, tuple(varying))
 
 
 @reused

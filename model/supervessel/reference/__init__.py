@@ -25,6 +25,7 @@ from supervessel.reference.attitude import attitude_dot, quaternion, rotation_ma
 from supervessel.reference.changes import at_contact, change
 from supervessel.reference.gravity import gravity_torque, orbit_dot
 from supervessel.reference.laws import angular_acceleration, law_tensor
+from supervessel.reference.loads import loads, point_outputs
 from supervessel.reference.rotation import (
     angular_momentum,
     angular_velocity,
@@ -59,11 +60,13 @@ __all__ = [
     "internal_momentum",
     "joined",
     "law_tensor",
+    "loads",
     "momentum_ode",
     "motions",
     "net_force",
     "ode",
     "orbit_dot",
+    "point_outputs",
     "points",
     "port_axes",
     "poses",

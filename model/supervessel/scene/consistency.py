@@ -12,6 +12,7 @@ from supervessel.problems import listed, printable, quantity, toml_key
 from supervessel.rotation.propagators import PROPAGATORS
 from supervessel.scene.inputs import by_group, by_name
 from supervessel.scene.numbers import Vector, is_number, triangle_problem, vector_length
+from supervessel.scene.outputs import is_accelerated
 from supervessel.scene.schema import (
     CHOSEN,
     MOST_STEPS,
@@ -34,6 +35,7 @@ def consistency_problems(raw: Mapping[str, Any]) -> list[str]:
         for port, table in tables(vessel, "ports"):
             problems += direction_problems(f"{place}.ports.{toml_key(port)}", table)
     problems += [*_experiment(raw), *_accuracy(raw), *_ranges(raw), *_total_mass(raw), *_wheels(raw)]
+    problems += _accelerated(raw)
     return [*problems, *_gravity(raw), *_propagator(raw), *_changes(raw)]
 
 
@@ -219,6 +221,28 @@ def _wheels(raw: Mapping[str, Any]) -> Iterator[str]:
         yield "accuracy: the bounds by which it chooses know no wheels; give law and propagator yourself"
     if _shows_bound(raw):
         yield "outputs.names: error_bound knows no wheels; leave it out of a scene that has them"
+
+
+def _accelerated(raw: Mapping[str, Any]) -> Iterator[str]:
+    """Yields why the scene cannot have the outputs that follow from accelerations."""
+    outputs, inputs, rotation = (raw.get(key, {}) for key in ("outputs", "inputs", "rotation"))
+    if not all(isinstance(table, Mapping) for table in (outputs, inputs, rotation)):
+        return
+    moves = inputs.get("motion")
+    still = inputs.get("gravity") is True and rotation.get("law") == "none"
+    names = outputs.get("names", ())
+    for name in names if isinstance(names, list | tuple) else ():
+        if not (isinstance(name, str) and is_accelerated(name)):
+            continue
+        if moves:
+            reason = "accelerations are not known where inputs.motion lists ports"
+            yield f"outputs.names: {printable(name)}: {reason}; leave one of the two out"
+        if still:
+            yield f'outputs.names: {printable(name)}: rotation.law = "none" with inputs.gravity {NO_PLACE}'
+
+
+NO_PLACE = 'does not follow the place in the field; take another law, "decoupled" costs hardly more'
+"""Why the law none shows no acceleration in a field of gravity."""
 
 
 def _number(table: Mapping[str, Any], key: str) -> float:

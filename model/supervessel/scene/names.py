@@ -11,7 +11,7 @@ from typing import Any
 
 from supervessel.problems import listed, printable, quantity, toml_key, unknown
 from supervessel.scene.inputs import InputKind, by_group, kinds, part_of, rows_by_key, vessel_of
-from supervessel.scene.outputs import OUTPUTS, VESSEL_OUTPUTS, WHEEL_OUTPUTS
+from supervessel.scene.outputs import DOCK_OUTPUTS, OUTPUTS, POINT_OUTPUTS, VESSEL_OUTPUTS, WHEEL_OUTPUTS
 
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 MODEL_NAME = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*_?")
@@ -329,33 +329,44 @@ def _ranges(raw: Mapping[str, Any]) -> Iterator[str]:
 def _outputs(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
     names = [name for name in _list(_table(raw, "outputs"), "names") if isinstance(name, str)]
     yield from (f"outputs.names: {problem}" for problem in _repeated(names))
+    docks = dict.fromkeys(_dock_names(raw).values())
     for name in dict.fromkeys(names):
-        if name.count(".") == 2:
-            problem = _wheel_output_problem(raw, name)
-            if problem:
-                yield f"outputs.names: {problem}"
-            continue
-        vessel, dot, output = name.partition(".")
-        if dot and vessel in ports and output in VESSEL_OUTPUTS:
-            continue
-        if dot and vessel in ports:
-            yield f"outputs.names: {unknown(f'output of {vessel}', output, VESSEL_OUTPUTS)}"
-        elif dot and output in VESSEL_OUTPUTS:
-            yield f"outputs.names: {unknown('vessel', vessel, ports)}"
-        elif name not in OUTPUTS:
-            yield f"outputs.names: {unknown('output', name, OUTPUTS)}"
+        problem = (
+            _part_output_problem(raw, name) if name.count(".") == 2 else _output_problem(name, ports, docks)
+        )
+        if problem:
+            yield f"outputs.names: {problem}"
 
 
-def _wheel_output_problem(raw: Mapping[str, Any], name: str) -> str:
-    """Returns why "vessel.wheel.output" is no output of the scene, or "" if it is one."""
-    wheel, _, output = name.rpartition(".")
-    problem = _port_problem(wheel, _parts(raw, "wheels"), "wheel")
+def _output_problem(name: str, ports: Ports, docks: Collection[str]) -> str:
+    """Returns why "output" or one of a vessel or dock is no output of the scene, or "" if it is one."""
+    owner, dot, output = name.rpartition(".")
+    if not dot:
+        return "" if name in OUTPUTS else unknown("output", name, OUTPUTS)
+    if owner in ports:
+        return "" if output in VESSEL_OUTPUTS else unknown(f"output of {owner}", output, VESSEL_OUTPUTS)
+    if owner in docks:
+        return "" if output in DOCK_OUTPUTS else unknown(f"output of {owner}", output, DOCK_OUTPUTS)
+    if output in DOCK_OUTPUTS:
+        return unknown("dock", owner, docks) + "; a dock shows its load by its name"
+    return unknown("vessel", owner, ports) if output in VESSEL_OUTPUTS else unknown("output", name, OUTPUTS)
+
+
+def _part_output_problem(raw: Mapping[str, Any], name: str) -> str:
+    """Returns why "vessel.part.output" is no output of the scene, or "" if it is one."""
+    part, _, output = name.rpartition(".")
+    vessel, own = part_of(part)
+    points, wheels = (_parts(raw, key) for key in ("points", "wheels"))
+    if own in points.get(vessel, ()):
+        return "" if output in POINT_OUTPUTS else unknown(f"output of {part}", output, POINT_OUTPUTS)
+    if output in POINT_OUTPUTS and own not in wheels.get(vessel, ()):
+        return _port_problem(part, points, "point")
+    problem = _port_problem(part, wheels, "wheel")
     if problem:
         return problem
     if output not in WHEEL_OUTPUTS:
-        return unknown(f"output of {wheel}", output, WHEEL_OUTPUTS)
-    vessel, own = part_of(wheel)
+        return unknown(f"output of {part}", output, WHEEL_OUTPUTS)
     table = _table(_table(_table(_table(raw, "vessels"), vessel), "wheels"), own)
     if output == "speed" and table.get("inertia", 0.0) == 0.0:
-        return f"{name}: {printable(wheel)} has inertia 0, a momentum without a speed; take {wheel}.momentum"
+        return f"{name}: {printable(part)} has inertia 0, a momentum without a speed; take {part}.momentum"
     return ""

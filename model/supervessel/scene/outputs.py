@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import sqrt
+from typing import Literal
 
 AXES = ("x", "y", "z")
 QUATERNION = ("w", "x", "y", "z")
@@ -26,17 +28,28 @@ class Magnitudes:
     stored: float = 1.0
     spun: float = 1.0
 
+    @property
+    def size(self) -> float:
+        """Root of moment over mass [m]."""
+        return sqrt(self.moment / self.mass)
+
+
+OutputOwner = Literal["", "vessel", "dock", "wheel", "point"]
+"""Whose output it is: "" of the whole; a vessel, a dock, or a vessel's wheel or point."""
+
 
 @dataclass(frozen=True)
 class OutputKind:
     """A kind of output.
 
-    name        : name of the output; an output of a vessel is written "vessel.name" in a scene, one of a
-                  wheel "vessel.wheel.name"
+    name        : name of the output; in a scene the owner's name and a dot stand before it, "vessel.name",
+                  "dock.name", "vessel.wheel.name", "vessel.point.name"
     unit        : as FMI writes it, "" for a pure number
-    description : text of its variables with a place for {vessel}, or {wheel} as "vessel.wheel"
+    description : text of its variables with a place for {owner}, and of a dock for its ports {first} and
+                  {second} and the first one's vessel {first_vessel}
     labels      : of its elements, whose variables carry an index from 1; none for a scalar
-    of_vessel   : whether it is an output of a vessel, else of the assembly
+    owner       : whose it is
+    accelerated : whether it follows from the accelerations of parts, which are not known where ports move
     matrix      : whether it is a (3, 3) matrix, row by row, whose variables carry two indices
     axes        : whether it shows principal moments or axes, which are computed only for such outputs
     of_step     : whether it is a result of a communication step; the twin, which takes none, leaves it out
@@ -47,7 +60,8 @@ class OutputKind:
     unit: str
     description: str
     labels: tuple[str, ...] = AXES
-    of_vessel: bool = False
+    owner: OutputOwner = ""
+    accelerated: bool = False
     matrix: bool = False
     axes: bool = False
     of_step: bool = False
@@ -140,32 +154,32 @@ OUTPUTS: dict[str, OutputKind] = {
 VESSEL_OUTPUTS: dict[str, OutputKind] = {
     kind.name: kind
     for kind in (
-        OutputKind("origin", "m", "origin of {vessel}, from the barycentre, body axes", of_vessel=True),
+        OutputKind("origin", "m", "origin of {owner}, from the barycentre, body axes", owner="vessel"),
         OutputKind(
             "centre_of_mass",
             "m",
-            "centre of mass of {vessel}, from the barycentre, body axes",
-            of_vessel=True,
+            "centre of mass of {owner}, from the barycentre, body axes",
+            owner="vessel",
         ),
         OutputKind(
             "attitude",
             "",
-            "unit quaternion from the axes of {vessel} to body axes",
+            "unit quaternion from the axes of {owner} to body axes",
             QUATERNION,
-            of_vessel=True,
+            owner="vessel",
         ),
         OutputKind(
             "angular_velocity",
             "rad/s",
-            "angular velocity of {vessel} relative to inertial space, its own axes",
-            of_vessel=True,
+            "angular velocity of {owner} relative to inertial space, its own axes",
+            owner="vessel",
             nominal=lambda whole: whole.rate,
         ),
         OutputKind(
             "angular_momentum",
             "N.m.s",
-            "share of {vessel} in the angular momentum about the barycentre, inertial axes",
-            of_vessel=True,
+            "share of {owner} in the angular momentum about the barycentre, inertial axes",
+            owner="vessel",
             nominal=lambda whole: whole.moment * whole.rate,
         ),
     )
@@ -179,15 +193,17 @@ WHEEL_OUTPUTS: dict[str, OutputKind] = {
         OutputKind(
             "momentum",
             "N.m.s",
-            "angular momentum of wheel {wheel} along its axis, that of its vessel's rate included",
+            "angular momentum of wheel {owner} along its axis, that of its vessel's rate included",
             (),
+            owner="wheel",
             nominal=lambda whole: whole.stored,
         ),
         OutputKind(
             "speed",
             "rad/s",
-            "angular velocity of wheel {wheel} relative to its vessel",
+            "angular velocity of wheel {owner} relative to its vessel",
             (),
+            owner="wheel",
             nominal=lambda whole: whole.spun,
         ),
     )
@@ -195,14 +211,85 @@ WHEEL_OUTPUTS: dict[str, OutputKind] = {
 """Outputs of a wheel, by name, written "vessel.wheel.name" in a scene. The speed is zero while docks do not
 join the vessel to the root."""
 
-OF_OWNER = (OUTPUTS, VESSEL_OUTPUTS, WHEEL_OUTPUTS)
-"""By the number of names that an owner's name is made of, its outputs."""
+POINT_OUTPUTS: dict[str, OutputKind] = {
+    kind.name: kind
+    for kind in (
+        OutputKind(
+            "position",
+            "m",
+            "{owner} from the barycentre, body axes",
+            owner="point",
+            nominal=lambda whole: whole.size,
+        ),
+        OutputKind(
+            "velocity",
+            "m/s",
+            "velocity of {owner} relative to the barycentre, body axes",
+            owner="point",
+            nominal=lambda whole: whole.size * whole.rate,
+        ),
+        OutputKind(
+            "acceleration",
+            "m/s2",
+            "acceleration of {owner} relative to the barycentre, body axes",
+            owner="point",
+            accelerated=True,
+            nominal=lambda whole: whole.size * whole.rate**2,
+        ),
+        OutputKind(
+            "specific_force",
+            "m/s2",
+            "acceleration of {owner} less that of gravity there, as an accelerometer reads it, body axes",
+            owner="point",
+            accelerated=True,
+            nominal=lambda whole: whole.size * whole.rate**2,
+        ),
+    )
+}
+"""Outputs of a point, by name, written "vessel.point.name" in a scene. Velocity and acceleration are relative
+to axes that do not turn. All are zero while docks do not join the vessel to the root."""
+
+DOCK_OUTPUTS: dict[str, OutputKind] = {
+    kind.name: kind
+    for kind in (
+        OutputKind(
+            "force",
+            "N",
+            "force on {second} from {first}, axes of {first_vessel}",
+            owner="dock",
+            accelerated=True,
+            nominal=lambda whole: whole.mass * whole.size * whole.rate**2,
+        ),
+        OutputKind(
+            "moment",
+            "N.m",
+            "moment on {second} from {first} about the port, axes of {first_vessel}",
+            owner="dock",
+            accelerated=True,
+            nominal=lambda whole: whole.moment * whole.rate**2,
+        ),
+    )
+}
+"""Outputs of a dock that has a name, written "dock.name" in a scene. Both are zero while the dock is open."""
+
+OF_OWNER = (OUTPUTS, VESSEL_OUTPUTS | DOCK_OUTPUTS, WHEEL_OUTPUTS | POINT_OUTPUTS)
+"""By the number of names that an owner's name is made of, its outputs: no two owners of as many names have an
+output of the same name."""
 
 
 def output_kind(group: str) -> tuple[OutputKind, str]:
-    """Returns kind and owner of an output that a scene lists: "", "vessel" or "vessel.wheel".
+    """Returns kind and owner of an output that a scene lists: "", "vessel", "dock", "vessel.wheel" or
+    "vessel.point".
 
     Raises KeyError for an unknown name.
     """
     owner, _, name = group.rpartition(".")
     return OF_OWNER[len(owner.split(".")) if owner else 0][name], owner
+
+
+def is_accelerated(group: str) -> bool:
+    """Whether an output, written as in a scene, follows from accelerations; an unknown one does not."""
+    owner, _, name = group.rpartition(".")
+    parts = len(owner.split(".")) if owner else 0
+    kind = OF_OWNER[parts].get(name) if parts < len(OF_OWNER) else None
+    return kind is not None and kind.accelerated

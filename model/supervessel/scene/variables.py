@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from supervessel.scene.inputs import InputKind, Part, listed
+from supervessel.scene.inputs import InputKind, Part, listed, vessel_of
 from supervessel.scene.outputs import (
     AXES,
     OUTPUTS,
@@ -167,7 +167,7 @@ def output_variables(scene: Scene) -> tuple[OutputVariable, ...]:
         OutputVariable(
             name,
             kind.unit,
-            kind.description.format(vessel=owner, wheel=owner) + (f", {label}" if label else ""),
+            _described(scene, kind, owner) + (f", {label}" if label else ""),
             group=group,
             element=i,
             kind=kind,
@@ -177,6 +177,12 @@ def output_variables(scene: Scene) -> tuple[OutputVariable, ...]:
         for kind, owner in (output_kind(group),)
         for i, (name, label) in enumerate(kind.elements(group))
     )
+
+
+def _described(scene: Scene, kind: OutputKind, owner: str) -> str:
+    """Returns the description of an owner's output, without that of its elements."""
+    first, second = scene.dock(owner).ports if kind.owner == "dock" else ("", "")
+    return kind.description.format(owner=owner, first=first, second=second, first_vessel=vessel_of(first))
 
 
 def state_variables(scene: Scene) -> tuple[StateVariable, ...]:
@@ -208,7 +214,7 @@ def state_variables(scene: Scene) -> tuple[StateVariable, ...]:
 def _wheel_state(name: str) -> StateVariable:
     """Returns the state of the wheel called "vessel.wheel": no change of inputs changes it."""
     kind = WHEEL_OUTPUTS["momentum"]
-    words = f"state: {kind.description.format(wheel=name)}; it starts from {name}.momentum_start"
+    words = f"state: {kind.description.format(owner=name)}; it starts from {name}.momentum_start"
     group = f"state.{name}.{kind.name}"
     return StateVariable(group, kind.unit, words, group=group, kind=kind)
 
