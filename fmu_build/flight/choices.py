@@ -10,6 +10,7 @@ from supervessel.rotation.propagators import PROPAGATORS, plan_of, stepping
 from supervessel.rotation.propagators.method import Propagator
 from supervessel.scene.inputs import Change, by_name, listed, part_of, vessel_of
 from supervessel.scene.numbers import LEAST_TOLERANCE
+from supervessel.scene.outputs import is_accelerated
 from supervessel.scene.schema import Law, Scene
 
 LAWS_TRIED: tuple[Law, ...] = get_args(Law)
@@ -78,7 +79,8 @@ class Choice:
 
 def laws_of(scene: Scene) -> list[Law]:
     """Returns the laws that make sense in a scene, cheapest first."""
-    moves = scene.inputs.motion or scene.wheels
+    placed = scene.inputs.gravity and any(map(is_accelerated, scene.outputs.names))
+    moves = scene.inputs.motion or scene.wheels or placed
     return [law for law in LAWS_TRIED if not (law == "none" and moves)]
 
 

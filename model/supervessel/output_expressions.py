@@ -8,9 +8,9 @@ import casadi as ca
 
 from supervessel.composite.actions import net_force, vessel_outputs
 from supervessel.composite.inertia import from_upper_triangle
-from supervessel.composite.loads import load_outputs
-from supervessel.composite.points import Motion, SpunBeside, Tide, point_outputs
 from supervessel.composite.resolved import ResolvedScene
+from supervessel.composite.shown.loads import load_outputs
+from supervessel.composite.shown.points import InstantMotion, SpunBeside, Tide, point_outputs
 from supervessel.composite.wheels import (
     WheelAxes,
     axes_of,
@@ -50,12 +50,12 @@ class Known:
     dynamics: Dynamics
 
     @cached_property
-    def motion(self) -> Motion:
+    def motion(self) -> InstantMotion:
         """How the body moves at the instant."""
         state = ca.vertcat(self.attitude, self.omega, self.stored)
         alpha = self.dynamics.state_rate(state)[4:7]
         linear = net_force(self.resolved, self.parts, self.u) / self.parts["mass"]
-        return Motion(self.omega, alpha, linear, self._tide, self._spun)
+        return InstantMotion(self.omega, alpha, linear, self._tide, self._spun)
 
     @property
     def _tide(self) -> Tide | None:

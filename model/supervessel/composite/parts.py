@@ -11,10 +11,10 @@ import casadi as ca
 from supervessel.composite.actions import action_parts, vessel_parts
 from supervessel.composite.bodies import composite_body, lookup_in
 from supervessel.composite.inertia import Body, ldl, ldl_inverse, upper_triangle
-from supervessel.composite.loads import load_parts
-from supervessel.composite.points import point_parts
 from supervessel.composite.poses import anchor, constant
 from supervessel.composite.resolved import ResolvedScene
+from supervessel.composite.shown.loads import load_parts
+from supervessel.composite.shown.points import point_parts
 from supervessel.composite.wheels import (
     WheelAxes,
     free_inertia,
@@ -95,7 +95,7 @@ def composite_parts(resolved: ResolvedScene, p: ca.SX) -> dict[str, ca.SX]:
     wheels, wheel_rates : see `composite.wheels.wheel_parts`
     moment, force : see `composite.actions.action_parts`
     .NAME         : of the vessel NAME, see `composite.actions.vessel_parts`, of a point, see
-                    `composite.points.point_parts`, or of a dock, see `composite.loads.load_parts`
+                    `composite.shown.points.point_parts`, or of a dock, see `composite.shown.loads.load_parts`
     """
     lookup = lookup_in(resolved.shaping, p)
     body, wheels = composite_body(resolved, lookup), placed_wheels(resolved, lookup)

@@ -357,13 +357,11 @@ def _part_output_problem(raw: Mapping[str, Any], name: str) -> str:
     part, _, output = name.rpartition(".")
     vessel, own = part_of(part)
     points, wheels = (_parts(raw, key) for key in ("points", "wheels"))
-    if own in points.get(vessel, ()):
+    is_point, is_wheel = own in points.get(vessel, ()), own in wheels.get(vessel, ())
+    if is_point and not (is_wheel and output in WHEEL_OUTPUTS):
         return "" if output in POINT_OUTPUTS else unknown(f"output of {part}", output, POINT_OUTPUTS)
-    if output in POINT_OUTPUTS and own not in wheels.get(vessel, ()):
-        return _port_problem(part, points, "point")
-    problem = _port_problem(part, wheels, "wheel")
-    if problem:
-        return problem
+    if not is_wheel:
+        return _port_problem(part, *((points, "point") if output in POINT_OUTPUTS else (wheels, "wheel")))
     if output not in WHEEL_OUTPUTS:
         return unknown(f"output of {part}", output, WHEEL_OUTPUTS)
     table = _table(_table(_table(_table(raw, "vessels"), vessel), "wheels"), own)

@@ -55,7 +55,7 @@ class SpunBeside:
 
 
 @dataclass(frozen=True)
-class Motion:
+class InstantMotion:
     """How a body moves at an instant, all in body axes.
 
     omega  : angular velocity, (3,) [rad/s]
@@ -113,7 +113,7 @@ def point_parts(resolved: ResolvedScene, lookup: Lookup, whole: Body) -> dict[st
     return parts
 
 
-def point_outputs(name: str, part: ca.SX, motion: Motion) -> dict[str, ca.SX]:
+def point_outputs(name: str, part: ca.SX, motion: InstantMotion) -> dict[str, ca.SX]:
     """Returns the outputs of a point by name; `scene.outputs` says what they are, with units and axes.
 
     part : the point's part of c, (7,), in the layout of SIZES

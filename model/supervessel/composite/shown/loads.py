@@ -22,8 +22,8 @@ from supervessel.composite.bodies import (
     way_holds,
 )
 from supervessel.composite.inertia import Body, from_upper_triangle, offset_tensor, upper_triangle
-from supervessel.composite.points import Motion
 from supervessel.composite.resolved import ResolvedScene
+from supervessel.composite.shown.points import InstantMotion
 from supervessel.composite.wheels import WheelAxes
 from supervessel.layout import slices_of
 from supervessel.scene.inputs import vessel_of
@@ -132,7 +132,7 @@ def _wheels_on(resolved: ResolvedScene, vessels: Set[str]) -> list[int]:
 
 
 def load_outputs(
-    resolved: ResolvedScene, name: str, part: ca.SX, u: ca.SX, motion: Motion
+    resolved: ResolvedScene, name: str, part: ca.SX, u: ca.SX, motion: InstantMotion
 ) -> dict[str, ca.SX]:
     """Returns the outputs of a dock by name; `scene.outputs` says what they are, with units and axes.
 
@@ -140,7 +140,7 @@ def load_outputs(
     u    : the inputs that torques follow from, (m,)
     With s the specific force at the port and d the arm from there, f = m s + B g - sum F and t = g x s +
     J' alpha + omega x J' omega - 3 k r^ x J r^ - sum (M + d x F) + sum (u b + omega x h_w b): g is the lever,
-    B d is `Motion.felt_around`, and J' is J less what wheels have about their axes.
+    B d is `InstantMotion.felt_around`, and J' is J less what wheels have about their axes.
     """
     pieces = {key: part[place] for key, place in slices_of(SIZES).items()}
     J, lever = from_upper_triangle(pieces["inertia"]), pieces["lever"]

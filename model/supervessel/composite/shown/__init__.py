@@ -1,0 +1,1 @@
+"""What outputs show of points and docks, in CasADi symbols."""
