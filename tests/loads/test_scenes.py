@@ -7,7 +7,9 @@ import pytest
 from fmu_build.flight.choices import laws_of
 from loads.scenes import NEAR
 from supervessel.composite.resolved import resolve
+from supervessel.equations import equations
 from support import ISS_DG, scene, variant
+from support.pages import text
 from support.refusals import problems
 
 NAMED = variant(
@@ -92,3 +94,25 @@ def test_a_trade_leaves_out_the_law_that_cannot_show_the_loads_of_an_orbit():
     orbit = {"gravity": NEAR | {"position": [8e3, 0.0, 0.0]}, "inputs.gravity": True}
     assert "none" in laws_of(scene(variant(NAMED, orbit)))
     assert "none" not in laws_of(scene(variant(NAMED, orbit | {"outputs.names": ["berth.force"]})))
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (["berth.force", "berth.moment"], "takes {} operations"),
+        (["DG.imu.specific_force"], "force {} and {} ("),
+    ],
+)
+def test_the_page_says_how_many_operations_they_take(names, said):
+    raw = variant(NAMED, {"inputs.pose": [], "inputs.pmi": [], "outputs.names": ["attitude"]})
+    plain, with_them = (
+        equations(scene(variant(raw, {"outputs.names": shown})))
+        for shown in (["attitude"], ["attitude", *names])
+    )
+    costs = [
+        getattr(with_them, name).n_instructions() - getattr(plain, name).n_instructions()
+        for name in ("outputs", "composite")
+    ]
+    page = " ".join(text("model/docs/equations.md").split())
+    assert said.format(*costs) in page
+    assert f"{costs[1]} when the mass changes" in page or said.count("{}") == 2
