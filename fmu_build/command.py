@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from fmu_build.options import add_build_options, platforms_of
 from fmu_build.platforms import Platform
 from fmu_build.versions import NEWEST, VERSIONS
-from supervessel.problems import printable
+from supervessel.problems import first, printable
 from supervessel.shell.console import Parser, print_problem, print_results, show_progress
 from supervessel.shell.ending import say
 
@@ -48,6 +48,8 @@ def _build(options: argparse.Namespace, platforms: Sequence[Platform]) -> int:
 
     try:
         scene = load_scene(options.scene)
+        for note in first(scene.notes, "notes"):
+            print_problem(f"note: {printable(options.scene.name)}: {note}")
         output = options.output or Path(f"{scene.name}.fmu")
         check_fmu_output(output, [options.scene])
         chosen = _choose(scene) if scene.accuracy else []

@@ -147,6 +147,7 @@ def _facts(scene: Scene, fmi: int) -> str:
         rows.append(("attracting centre, mu [m3/s2]", scene.gravity.mu))
     if experiment is not None:
         rows += [("default duration [s]", experiment.duration), ("default step [s]", experiment.step)]
+    rows += [("mended", note) for note in scene.notes]
     return table("", (), rows)
 
 
@@ -174,8 +175,14 @@ def _moments(vessel: Vessel) -> tuple[str, Cell]:
     """Returns how a vessel's moments are given, with their unit, and the numbers."""
     if vessel.pmi is not None:
         return "pmi [m2]", vessel.pmi
+    if vessel.moments is not None:
+        about = "about the origin" if vessel.inertia_about == "origin" else "about the centre of mass"
+        numbers = (*vessel.moments, *(vessel.products or (0.0, 0.0, 0.0)))
+        return f"moments, products P_xy, P_yz, P_zx [kg.m2] {about}", numbers
     assert vessel.inertia is not None
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = vessel.inertia
+    if vessel.inertia_about == "origin":
+        return "inertia about the origin xx, yy, zz, xy, xz, yz [kg.m2]", (xx, yy, zz, xy, xz, yz)
     return "inertia xx, yy, zz, xy, xz, yz [kg.m2]", (xx, yy, zz, xy, xz, yz)
 
 

@@ -10,7 +10,7 @@ from fmu_build.trade.plotting import plot
 from fmu_build.trade.study import is_trade, study
 from fmu_build.trade.table import table
 from supervessel.loading import load_scene, parse_scene
-from supervessel.problems import SceneError, TradeError, printable
+from supervessel.problems import SceneError, TradeError, first, printable
 from supervessel.scene.schema import Scene, without_accuracy
 from supervessel.shell.console import print_problem, print_results, show_progress
 from supervessel.shell.ending import say
@@ -24,7 +24,10 @@ def trade(options: argparse.Namespace) -> int:
     """Runs the command: scene, output, quick and duration; returns its exit status."""
     say("; what has been flown is kept, the same command goes on from there")
     try:
-        scene = _lasting(without_accuracy(load_scene(options.scene)), options.duration)
+        scene = load_scene(options.scene)
+        for note in first(scene.notes, "notes"):
+            print_problem(f"note: {printable(options.scene.name)}: {note}")
+        scene = _lasting(without_accuracy(scene), options.duration)
         folder: Path = options.output or Path(f"{scene.name}_trade")
         course_of(scene)
         with made_folder(folder):

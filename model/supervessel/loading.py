@@ -16,7 +16,7 @@ from supervessel.orbit import orbit_problem
 from supervessel.problems import SceneError, few_suggestions, key_path, quantity, unknown
 from supervessel.scene.consistency import consistency_problems
 from supervessel.scene.names import misnamed_courses, naming_problems, size_problems
-from supervessel.scene.numbers import LARGEST_PLACE
+from supervessel.scene.numbers import LARGEST_PLACE, WrittenNumber
 from supervessel.scene.schema import Scene, known_keys
 from supervessel.scene.variables import InputVariable
 from supervessel.shell.reading import ReadingError, read_toml
@@ -43,7 +43,7 @@ def load_scene(path: str | Path) -> Scene:
     """
     path = Path(path)
     try:
-        raw = read_toml(path)
+        raw = read_toml(path, WrittenNumber)
     except ReadingError as error:
         place = f"line {error.line}: " if error.line else ""
         raise SceneError(str(path), [f"{place}{error}"]) from None

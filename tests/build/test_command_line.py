@@ -21,7 +21,8 @@ BROKEN = BALL.replace("mass = 2.0", "mass = -2.0").replace('root = "B"', 'root =
 BROKEN_PROBLEMS = [
     "ball.toml: vessels.B.mass = -2.0 kg: must be a finite number >= 0",
     'ball.toml: vessels.B: unknown key "colour"; '
-    "known: mass, pmi, inertia, centre_of_mass, ports, points, wheels",
+    "known: mass, pmi, inertia, moments, products, inertia_about, mend, "
+    "centre_of_mass, ports, points, wheels",
     'ball.toml: root: unknown vessel "C"; known: B',
 ]
 

@@ -4,6 +4,7 @@ import re
 import tomllib
 from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
 
 from fmu_build.document.documentation import documentation
@@ -101,10 +102,14 @@ def test_the_tables_of_the_page_on_changes_make_a_scene():
     assert scene.inputs.force == ("DG.rcs1",)
 
 
-def test_the_vessel_of_the_page_on_scenes_is_one():
+def test_the_vessels_of_the_page_on_scenes_are_one():
     (block,) = map(tomllib.loads, blocks("model/docs/scene.md", "toml"))
-    scene = parse_scene(body() | {"root": "tug", "vessels": block["vessels"]})
-    assert scene.vessels["tug"].specific_inertia[0][1] == 200.0 / 4000.0
+    tug, same = (
+        parse_scene(body() | {"root": name, "vessels": {name: vessel}}).vessels[name]
+        for name, vessel in block["vessels"].items()
+    )
+    assert tug.specific_inertia[0][1] == 200.0 / 4000.0
+    assert np.abs(np.subtract(tug.tensor, same.tensor)).max() <= 1e-11
 
 
 def test_the_log_line_of_the_page_on_the_fmu_is_the_real_one():

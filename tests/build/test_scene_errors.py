@@ -24,7 +24,7 @@ from support.refusals import (
     shaped,
 )
 
-ROWS = "must be three rows of three finite numbers"
+ROWS = "must be three finite numbers, the diagonal, or three rows of them"
 NAMES = "must be a list of names in quotes"
 NOT_DOCKED = "inputs.pose: DG.nose is not docked; its pose would change nothing"
 
@@ -122,7 +122,7 @@ WRONG_TYPES = [
         f"vessels.DG.centre_of_mass = [0.5] m: {THREE}",
     ),
     shaped("inertia of two rows", CUBE[:2], f"vessels.B.inertia = {CUBE[:2]} kg m2: {ROWS}"),
-    shaped("inertia a vector", [1.0, 1.0, 1.0], f"vessels.B.inertia = [1.0, 1.0, 1.0] kg m2: {ROWS}"),
+    shaped("inertia of two numbers", [1.0, 1.0], f"vessels.B.inertia = [1.0, 1.0] kg m2: {ROWS}"),
     case(
         "angular velocity of four",
         {"rotation.angular_velocity": [0, 0, 0, 1]},

@@ -15,7 +15,8 @@ UNKNOWN_KEYS = [
     case(
         "vessel, none near",
         {"vessels.DG.com": [0.0, 0.0, 0.0]},
-        'vessels.DG: unknown key "com"; known: mass, pmi, inertia, centre_of_mass, ports, points, wheels',
+        'vessels.DG: unknown key "com"; known: mass, pmi, inertia, moments, products, inertia_about, '
+        "mend, centre_of_mass, ports, points, wheels",
     ),
     case("port", {f"{NOSE}.directon": 1}, f'{NOSE}: unknown key "directon" (did you mean "direction"?)'),
     case(

@@ -11,7 +11,8 @@ from typing import Any
 from supervessel.problems import listed, printable, quantity, toml_key
 from supervessel.rotation.propagators import PROPAGATORS
 from supervessel.scene.inputs import by_group, by_name
-from supervessel.scene.numbers import Vector, is_number, triangle_problem, vector_length
+from supervessel.scene.mending import mend
+from supervessel.scene.numbers import Vector, is_number, vector_length
 from supervessel.scene.outputs import is_accelerated
 from supervessel.scene.schema import (
     CHOSEN,
@@ -20,6 +21,7 @@ from supervessel.scene.schema import (
     PERPENDICULAR_LIMIT,
     tables,
 )
+from supervessel.scene.sheets import CENTRE, MOMENT_KEYS, sheet_of, sheet_problem, sheet_text
 
 HALF_ULP = 2.0**-53
 
@@ -40,27 +42,46 @@ def consistency_problems(raw: Mapping[str, Any]) -> list[str]:
 
 
 def _moments(place: str, vessel: Mapping[str, Any]) -> Iterator[str]:
-    if "pmi" not in vessel and "inertia" not in vessel:
+    """Yields why a vessel's keys do not give its moments, or more than them."""
+    given = [key for key in MOMENT_KEYS if key in vessel]
+    if not given:
         yield f"{place}.pmi: missing; a vessel needs pmi [m2] or inertia [kg m2]"
-    if "pmi" in vessel and "inertia" in vessel:
-        yield f"{place}.inertia: given beside pmi; a vessel takes one of the two"
-    elif "inertia" in vessel and _number(vessel, "mass") == 0.0:
-        yield f"{place}.mass = 0.0 kg: must be > 0 for a vessel given by inertia; inertia/mass is kept"
+    if len(given) > 1:
+        yield from (
+            f"{place}.{key}: given beside {given[0]}; a vessel takes one of the two" for key in given[1:]
+        )
+    elif given not in ([], ["pmi"]) and _number(vessel, "mass") == 0.0:
+        yield f"{place}.mass = 0.0 kg: must be > 0 for a vessel given by {given[0]}; inertia/mass is kept"
+    if "products" in vessel and "moments" not in vessel:
+        products = quantity(vessel["products"], "kg m2")
+        yield f"{place}.products = {products}: without effect; they go with moments [kg m2]"
+    if "pmi" in vessel and vessel.get("inertia_about", CENTRE) != CENTRE:
+        about = f"{place}.inertia_about = {quantity(vessel['inertia_about'])}"
+        yield f"{about}: given beside pmi, which is about the centre of mass; give inertia or moments [kg m2]"
 
 
 def _rigid_moments(place: str, vessel: Mapping[str, Any]) -> Iterator[str]:
-    pmi = vessel.get("pmi")
-    if not (isinstance(pmi, list | tuple) and len(pmi) == 3 and all(map(is_number, pmi)) and min(pmi) >= 0):
+    """Yields why no rigid body has a vessel's moments, nor any that `mend` may take in their place."""
+    sheet = sheet_of(vessel)
+    problem = sheet_problem(sheet) if sheet is not None else ""
+    if sheet is None or not problem:
         return
-    x, y, z = map(float, pmi)
-    problem = triangle_problem((x, y, z))
-    if problem:
-        yield f"{place}.pmi = {quantity((x, y, z), 'm2')}: {problem}"
+    if vessel.get("mend") is True:
+        found = mend(sheet)
+        if found.sheet is not None:
+            return
+        problem += f"; mend = true moves each number by half a unit of its last digit, and {found.share:.3g} "
+        problem += "of that would be needed at least"
+    yield f"{place}{sheet_text(vessel, sheet)}: {problem}"
 
 
 def _no_tensor(place: str, vessel: Mapping[str, Any]) -> Iterator[str]:
-    if "inertia" in vessel:
-        yield f'{place}.inertia: convention = "orbiter" knows no products of inertia; give pmi [m2]'
+    """Yields why a vessel cannot be as it is under Orbiter's convention."""
+    for key in ("inertia", "moments"):
+        if key in vessel:
+            yield f'{place}.{key}: convention = "orbiter" knows no products of inertia; give pmi [m2]'
+    if vessel.get("mend") is True:
+        yield f'{place}.mend = true: convention = "orbiter" takes moments that no body has; leave it out'
 
 
 def direction_problems(place: str, port: Mapping[str, Any]) -> Iterator[str]:
@@ -192,9 +213,9 @@ def _gravity(raw: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _total_mass(raw: Mapping[str, Any]) -> Iterator[str]:
-    masses = [_number(vessel, "mass") for _, vessel in tables(raw, "vessels") if "inertia" not in vessel]
-    masses += [
-        _number(vessel, "mass") or math.nan for _, vessel in tables(raw, "vessels") if "inertia" in vessel
+    masses = [
+        _number(vessel, "mass") or (0.0 if {"inertia", "moments"}.isdisjoint(vessel) else math.nan)
+        for _, vessel in tables(raw, "vessels")
     ]
     if masses and all(mass >= 0.0 for mass in masses) and not 0.0 < sum(masses) < math.inf:
         yield f"vessels: total mass = {sum(masses)} kg: must be a finite number > 0"

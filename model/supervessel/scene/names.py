@@ -12,6 +12,7 @@ from typing import Any
 from supervessel.problems import listed, printable, quantity, toml_key, unknown
 from supervessel.scene.inputs import InputKind, by_group, kinds, part_of, rows_by_key, vessel_of
 from supervessel.scene.outputs import DOCK_OUTPUTS, OUTPUTS, POINT_OUTPUTS, VESSEL_OUTPUTS, WHEEL_OUTPUTS
+from supervessel.scene.sheets import MOMENT_KEYS
 
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 MODEL_NAME = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*_?")
@@ -266,8 +267,11 @@ def _inputs(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
     def vessel_problem(kind: InputKind, name: str) -> str | None:
         if name not in ports:
             return unknown("vessel", name, ports)
-        if kind.given_by == "pmi" and "inertia" in _table(_table(raw, "vessels"), name):
-            return f"{printable(name)} is given by inertia; only a vessel given by pmi has this input"
+        table = _table(_table(raw, "vessels"), name)
+        others = [key for key in MOMENT_KEYS if key in table and key != kind.given_by]
+        if kind.given_by and others:
+            given = f"{printable(name)} is given by {others[0]}"
+            return f"{given}; only a vessel given by {kind.given_by} has this input"
         return None
 
     def problem_of(kind: InputKind, name: str) -> str | None:

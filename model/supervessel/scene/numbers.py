@@ -23,6 +23,23 @@ LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-15, 0.1
 EIGENVALUE_SLACK = 16.0 * EPSILON
 
 
+class WrittenNumber(float):
+    """A number with the text of the file that it is from: its last digit says how far it is rounded.
+
+    text : as the file has it
+    """
+
+    text: str
+
+    def __new__(cls, text: str) -> "WrittenNumber":
+        number = super().__new__(cls, text)
+        number.text = text
+        return number
+
+    def __getnewargs__(self) -> tuple[str]:  # type: ignore[override]
+        return (self.text,)
+
+
 def is_number(value: object) -> bool:
     """Whether `value` is an integer or float (not a Boolean) that a double holds as a finite number."""
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -64,8 +81,12 @@ def vector(unit: str, allowed: str, size: int = 3, low: float = -math.inf) -> Be
 
 
 def _tensor(value: object) -> Matrix:
+    """Returns a tensor that is given by three rows, or by its diagonal."""
     unit = "kg m2"
     where = f" = {quantity(value, unit)}: "
+    if isinstance(value, list | tuple) and len(value) == 3 and all(map(is_number, value)):
+        x, y, z = map(float, value)
+        return ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z))
     if not (
         isinstance(value, list | tuple)
         and len(value) == 3
@@ -74,15 +95,12 @@ def _tensor(value: object) -> Matrix:
             for row in value
         )
     ):
-        raise ValueError(where + "must be three rows of three finite numbers")
+        raise ValueError(where + "must be three finite numbers, the diagonal, or three rows of them")
     tensor = np.array(value, dtype=float)
     for i, j in ((0, 1), (0, 2), (1, 2)):
         if tensor[i, j] != tensor[j, i]:
             here, there = f"[{i + 1},{j + 1}] = {tensor[i, j]}", f"[{j + 1},{i + 1}] = {tensor[j, i]}"
             raise ValueError(f"{where}must be symmetric, but {here} and {there}")
-    problem = tensor_problem(tensor)
-    if problem:
-        raise ValueError(where + problem)
     xx, xy, xz, _, yy, yz, _, _, zz = tensor.ravel().tolist()
     return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
@@ -101,17 +119,18 @@ def triangle_problem(moments: Vector) -> str:
     return f"{large} exceeds {small} + {middle} by {excess:.6g}; no rigid body has these moments"
 
 
-def tensor_problem(tensor: NDArray[np.float64]) -> str:
+def tensor_problem(tensor: NDArray[np.float64], size: float = 0.0) -> str:
     """Returns why no rigid body has this inertia tensor, or "" if one may have it.
 
-    tensor : (3, 3) [kg m2], symmetric, finite
+    tensor : (3, 3) [kg m2], about the centre of mass, symmetric, finite
+    size   : of the largest number from which it was made [kg m2], where that may be larger than the tensor
     Principal moments must not be negative and must obey the triangle inequality, both within EIGENVALUE_SLACK
-    of the largest.
+    of the largest, or of `size`.
     """
     moments: list[float] = np.linalg.eigvalsh(
         tensor
     ).tolist()  # sums beyond all floats are inf without a warning
-    slack = EIGENVALUE_SLACK * max(map(abs, moments))
+    slack = EIGENVALUE_SLACK * max(size, *map(abs, moments))
     three = ", ".join(f"{moment:.10g}" for moment in moments)
     if moments[0] < -slack:
         return f"must be positive semidefinite, but its principal moments are {three} kg m2"
@@ -162,6 +181,7 @@ def _is_row(row: object) -> bool:
 
 Mass = Annotated[float, number("kg", "a finite number >= 0", 0.0)]
 Pmi = Annotated[Vector, vector("m2", "three finite numbers >= 0", low=0.0)]
+Moments = Annotated[Vector, vector("kg m2", "three finite numbers")]
 Tensor = Annotated[Matrix, BeforeValidator(_tensor)]
 Position = Annotated[Vector, vector("m", "three finite numbers")]
 Direction = Annotated[

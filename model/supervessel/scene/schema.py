@@ -7,11 +7,20 @@ files and checks the tables against each other.
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ModelWrapValidatorHandler,
+    PrivateAttr,
+    model_validator,
+)
 
 from supervessel.problems import quantity
 from supervessel.rotation.propagators import PROPAGATORS
 from supervessel.scene.inputs import part_of
+from supervessel.scene.mending import mend_note, mended_values
 from supervessel.scene.numbers import (
     Angle,
     AngularVelocity,
@@ -22,6 +31,7 @@ from supervessel.scene.numbers import (
     Direction,
     Mass,
     Matrix,
+    Moments,
     Mu,
     Pmi,
     Position,
@@ -34,6 +44,7 @@ from supervessel.scene.numbers import (
     WheelInertia,
     WheelMomentum,
 )
+from supervessel.scene.sheets import about_centre, tensor_from_moments
 
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 
@@ -96,6 +107,7 @@ Names = Annotated[tuple[str, ...], BeforeValidator(_names)]
 Flag = Annotated[bool, BeforeValidator(_flag)]
 Said = Annotated[str, BeforeValidator(_said)]
 Convention = Literal["rigid_body", "orbiter"]
+About = Literal["centre_of_mass", "origin"]
 Law = Literal["none", "decoupled", "principal", "tensor"]
 Kept = Literal["rate", "momentum"]
 PROPAGATOR_NAMES = ("auto", *PROPAGATORS)
@@ -133,21 +145,52 @@ class Wheel(Table):
 class Vessel(Table):
     """A rigid part: mass [kg], moments about its centre of mass, centre of mass [m] in vessel axes, ports.
 
-    Either `pmi`, three mass-normalised moments [m2] along the vessel axes, or `inertia`, the full
-    tensor [kg m2] at the mass given, which scales with the mass when that is an input.
+    Its moments are one of three: `pmi`, three mass-normalised moments [m2] along the vessel axes; `inertia`,
+    the full tensor [kg m2] or its diagonal; `moments` [kg m2] with `products`, the integrals of x y, y z, z x
+    over mass [kg m2]. The last two are at the mass given and scale with the mass when that is an input.
     The tensor is taken about the vessel's centre of mass, in vessel axes: its diagonal elements are the
     integrals of y^2 + z^2, z^2 + x^2, x^2 + y^2 over mass, its off-diagonal elements MINUS the integrals of
-    x y, x z, y z. Where a data sheet states products of inertia as the integrals themselves, their signs are
-    to be reversed. See model/docs/equations.md, "What an inertia is".
+    x y, x z, y z. With `inertia_about` "origin" inertia, or moments and products, are about the origin of the
+    vessel axes, at the mass given. With `mend` published, rounded numbers that no body can have are moved by
+    no more than the rounding of their last digits, and the fields are those that a body can have; see
+    `published`. See model/docs/equations.md, "What an inertia is".
     """
 
     mass: Mass
     pmi: Pmi | None = None
     inertia: Tensor | None = None
+    moments: Moments | None = None
+    products: Moments | None = None
+    inertia_about: Annotated[About, _one_of(*get_args(About))] = "centre_of_mass"
+    mend: Flag = False
     centre_of_mass: Position = ORIGIN
     ports: dict[str, Port] = Field(default_factory=dict)
     points: dict[str, Point] = Field(default_factory=dict)
     wheels: dict[str, Wheel] = Field(default_factory=dict)
+    _published: dict[str, Any] = PrivateAttr(default_factory=dict)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _mended(cls, raw: Any, read: ModelWrapValidatorHandler["Vessel"]) -> "Vessel":
+        moved = mended_values(raw) if isinstance(raw, Mapping) else {}
+        vessel = read({**raw, **moved} if moved else raw)
+        vessel._published.update({key: raw[key] for key in moved})
+        return vessel
+
+    @property
+    def published(self) -> Mapping[str, Any]:
+        """By key, the numbers of the scene file that `mend` has moved; empty where it has moved none."""
+        return self._published
+
+    @property
+    def tensor(self) -> Matrix | None:
+        """Inertia tensor at the mass given, (3, 3) [kg m2], about the centre of mass; None with `pmi`."""
+        given = self.inertia
+        if self.moments is not None:
+            given = tensor_from_moments(self.moments, self.products)
+        if given is not None and self.inertia_about == "origin":
+            return about_centre(given, self.mass, self.centre_of_mass)
+        return given
 
     @property
     def specific_inertia(self) -> Matrix:
@@ -155,8 +198,9 @@ class Vessel(Table):
         if self.pmi is not None:
             k1, k2, k3 = self.pmi
             return ((k1, 0.0, 0.0), (0.0, k2, 0.0), (0.0, 0.0, k3))
-        assert self.inertia is not None
-        return tuple(tuple(x / self.mass for x in row) for row in self.inertia)  # type: ignore[return-value]
+        tensor = self.tensor
+        assert tensor is not None
+        return tuple(tuple(x / self.mass for x in row) for row in tensor)  # type: ignore[return-value]
 
 
 class Dock(Table):
@@ -356,6 +400,21 @@ class Scene(Table):
             ()
         """
         return tuple(f"{name}.{wheel}" for name, vessel in self.vessels.items() for wheel in vessel.wheels)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the reading of the scene has changed in its numbers, a line each: what `mend` has moved.
+
+        Example:
+            >>> scene.notes
+            ()
+        """
+        moved = {name: vessel for name, vessel in self.vessels.items() if vessel.published}
+        raw = {name: vessel.model_dump(exclude_unset=True) for name, vessel in moved.items()}
+        return tuple(
+            f"vessels.{name}{mend_note({**raw[name], **vessel.published}, raw[name])}"
+            for name, vessel in moved.items()
+        )
 
     def dock(self, name: str) -> Dock:
         """Returns the dock of that name. Raises KeyError if there is none.

@@ -5,14 +5,16 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from supervessel.problems import BARE
+from supervessel.scene.numbers import WrittenNumber
 from supervessel.scene.schema import CHOSEN, Scene
 
 
 def scene_text(scene: Scene) -> str:
     """Returns the text of a file, TOML, that `load_scene` reads as the same scene.
 
-    It has the keys that the scene gives, defaults are left out, and each number to the last bit; comments and
-    the order of keys are not those of the file that the scene was read from. What `[accuracy]` has chosen is
+    It has the keys that the scene gives, defaults are left out, and each number to the last bit; numbers that
+    `mend` has moved are as they were published, to the last digit. Comments and the order of keys are not
+    those of the file that the scene was read from. What `[accuracy]` has chosen is
     left to be chosen again.
 
     Example:
@@ -20,6 +22,8 @@ def scene_text(scene: Scene) -> str:
         'name = "iss_dg"'
     """
     raw = scene.model_dump(mode="json", exclude_unset=True, exclude_none=True)
+    for name, vessel in scene.vessels.items():
+        raw["vessels"][name] |= vessel.published
     if scene.accuracy is not None and "rotation" in raw:
         raw["rotation"] = {key: value for key, value in raw["rotation"].items() if key not in CHOSEN}
     return "\n".join(_table(raw, ())) + "\n"
@@ -60,4 +64,4 @@ def _value(value: Any) -> str:
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, list):
         return f"[{', '.join(map(_value, value))}]"
-    return repr(value)
+    return value.text if isinstance(value, WrittenNumber) else repr(value)

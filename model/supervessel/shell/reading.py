@@ -4,6 +4,7 @@ import os
 import re
 import stat
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -46,13 +47,16 @@ class ReadingError(ValueError):
         super().__init__(problem)
 
 
-def read_toml(path: Path) -> dict[str, Any]:
-    """Returns the tables of a TOML file. Raises ReadingError."""
+def read_toml(path: Path, number: Callable[[str], Any] = float) -> dict[str, Any]:
+    """Returns the tables of a TOML file. Raises ReadingError.
+
+    number : makes a number of the text of each one that is no integer
+    """
     text = read_text(path, LARGEST_TOML)
     _check_depth(text)
     _check_keys(text)
     try:
-        return tomllib.loads(text)
+        return tomllib.loads(text, parse_float=number)
     except ValueError as error:  # of integers too long as well
         raise ReadingError(f"is not TOML: {error}") from None
 

@@ -1,0 +1,168 @@
+"""Published, rounded moments that no body can have, moved within their rounding to moments that one can have.
+
+A body has second moments of mass S = 1/2 tr(J) E - J, the integrals of x x, x y, ..., that are positive
+semidefinite, and every such S is that of a body: S >= 0 holds the triangle inequalities of the principal
+moments. Of the numbers x as published and h, half a unit of the last digit of each, two convex problems ask:
+
+    the least s for which moves y h with |y_i| <= s give S(x + y h) >= 0: the numbers are refused if s > 1
+    the least sum of y_i^2 with |y_i| <= 1 and S(x + y h) >= 0: its y is unique, and what need not move stays
+
+Both are solved by Newton's method on their logarithmic barriers -log det S - sum log(s^2 - y_i^2), which are
+self-concordant: from a point inside, a step cut to 1/(1 + decrement) stays inside. With the objective over t
+added, the minimum is within (3 + 2 k) t of the least one, k numbers. Source: [BV] sections 9.6.4 and 11.6.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supervessel.problems import quantity
+from supervessel.scene.sheets import Sheet, sheet_of, sheet_problem, sheet_text, tensor_of
+
+WEIGHTS = 0.1 ** np.arange(0.0, 11.5, 0.5)
+"""Weights t of the barrier, one after the other."""
+CENTRED = 0.1
+"""Newton's decrement from which a minimum counts as found."""
+MOST_STEPS = 100
+"""Most steps of Newton's method for one weight."""
+
+Numbers = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Mended:
+    """What comes of a sheet's numbers.
+
+    sheet : with numbers that a body can have; None where the rounding does not reach so far
+    share : largest move over half a unit of the last digit; without a sheet what would be needed at least
+    """
+
+    sheet: Sheet | None
+    share: float
+
+
+def mended_values(vessel: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns the values of the keys of a vessel's table that `mend = true` changes, and their new numbers.
+
+    Empty where the table does not ask for it, where a body can have the moments as they are, and where the
+    rounding does not reach so far.
+    """
+    sheet = sheet_of(vessel) if vessel.get("mend") is True else None
+    found = mend(sheet) if sheet is not None and sheet_problem(sheet) else None
+    if found is None or found.sheet is None:
+        return {}
+    moved = found.sheet.elements.tolist()
+    if sheet is not None and sheet.key == "inertia":
+        rows = tensor_of(moved).tolist()
+        return {"inertia": moved[:3] if len(np.shape(vessel["inertia"])) == 1 else rows}
+    products = {"products": [-element for element in moved[3:]]} if "products" in vessel else {}
+    return {found.sheet.key: moved[:3], **products}
+
+
+def mend_note(published: Mapping[str, Any], moved: Mapping[str, Any]) -> str:
+    """Returns what was mended, and by how much, in words that stand behind the vessel's path.
+
+    published, moved : raw tables of a vessel, before and after; both hold all keys of the sheet
+    """
+    before, after = sheet_of(published), sheet_of(moved)
+    assert before is not None
+    assert after is not None
+    moves = np.abs(after.elements - before.elements)
+    written = before.halves > 0.0
+    share = float(np.max(moves[written] / before.halves[written]))
+    digit = f"{share:.3g} of half a unit of the last digit"
+    most = quantity(float(f"{np.max(moves):.3g}"), before.unit)
+    return (
+        f"{sheet_text(published, before)}: mended to {sheet_text(moved, after)[1:]}: by up to {most}, {digit}"
+    )
+
+
+def mend(sheet: Sheet) -> Mended:
+    """Returns the nearest moments that a body can have, each off by half a unit of its last digit at most.
+
+    sheet : with moments that no body can have
+    """
+    free = np.flatnonzero(sheet.halves > 0.0)
+    unit = float(np.max(sheet.halves))
+    given = _second_moments((sheet.elements - sheet.shift) / unit)
+    halves = sheet.halves[free] / unit
+    moved_by = np.array([half * _second_moments(np.eye(6)[i]) for i, half in zip(free, halves, strict=True)])
+    moves, share = _inside(given, moved_by, halves)
+    if share >= 1.0:
+        return Mended(None, share)
+    elements = sheet.elements.copy()
+    elements[free] += unit * halves * _nearest(given, moved_by, moves)
+    moved = replace(sheet, elements=elements)
+    return Mended(None, 1.0) if sheet_problem(moved) else Mended(moved, share)
+
+
+def _second_moments(elements: Numbers) -> Numbers:
+    """Returns S = 1/2 tr(J) E - J, (3, 3), of a tensor by its elements (6,)."""
+    return 0.5 * float(np.sum(elements[:3])) * np.eye(3) - tensor_of(elements)
+
+
+def _inside(given: Numbers, moved_by: Numbers, halves: Numbers) -> tuple[Numbers, float]:
+    """Returns moves y, (k,), with |y_i| < s and S > 0, and s; s is below 1, or the least one within 1e-9.
+
+    given    : S of the numbers as published, (3, 3)
+    moved_by : what a move by half a unit of the last digit adds to S, (k, 3, 3), the diagonal's first
+    halves   : half a unit of the last digit, (k,), the largest is 1
+    """
+    raised = 2.0 * (
+        1.0 + max(0.0, -float(np.linalg.eigvalsh(given)[0]))
+    )  # the diagonal, by so much, is enough
+    moves = np.zeros(len(halves))
+    moves[:3] = raised / halves[:3]
+    point = np.array([*moves, 2.0 * float(np.max(moves))])
+    for weight in WEIGHTS:
+        for _ in range(MOST_STEPS):
+            gradient, hessian = _barrier(given, moved_by, point[:-1], point[-1])
+            gradient[-1] += 1.0 / weight
+            step, decrement = _newton(gradient, hessian)
+            point += step
+            if point[-1] < 1.0:
+                return point[:-1], float(point[-1])
+            if decrement < CENTRED:
+                break
+    return point[:-1], float(point[-1])
+
+
+def _nearest(given: Numbers, moved_by: Numbers, moves: Numbers) -> Numbers:
+    """Returns the moves y, (k,), of the least sum of squares with |y_i| < 1 and S > 0.
+
+    moves : any with |y_i| < 1 and S > 0; for the others see `_inside`
+    """
+    for weight in WEIGHTS:
+        for _ in range(MOST_STEPS):
+            gradient, hessian = (x[..., :-1] for x in _barrier(given, moved_by, moves, 1.0))
+            step, decrement = _newton(gradient + moves / weight, hessian[:-1] + np.eye(len(moves)) / weight)
+            moves = moves + step
+            if decrement < CENTRED:
+                break
+    return moves
+
+
+def _newton(gradient: Numbers, hessian: Numbers) -> tuple[Numbers, float]:
+    """Returns a step of Newton's method that stays inside, and Newton's decrement."""
+    step: Numbers = np.linalg.solve(hessian, -gradient).astype(np.float64)
+    decrement = sqrt(max(0.0, -float(gradient @ step)))
+    return step / (1.0 + decrement), decrement
+
+
+def _barrier(given: Numbers, moved_by: Numbers, moves: Numbers, most: float) -> tuple[Numbers, Numbers]:
+    """Returns gradient, (k + 1,), and Hessian of -log det S - sum log(s^2 - y_i^2) by the moves y and s."""
+    inverse = np.linalg.inv(given + np.tensordot(moves, moved_by, 1))
+    turned = inverse @ moved_by
+    above, below = 1.0 / (most - moves), 1.0 / (most + moves)
+    curvature = above**2 + below**2
+    pulled = np.trace(turned, axis1=1, axis2=2)
+    gradient: Numbers = np.array([*(above - below - pulled), -np.sum(above + below)])
+    hessian = np.zeros((len(moves) + 1, len(moves) + 1))
+    hessian[:-1, :-1] = np.einsum("aij,bji->ab", turned, turned) + np.diag(curvature)
+    hessian[-1, :-1] = hessian[:-1, -1] = below**2 - above**2
+    hessian[-1, -1] = np.sum(curvature)
+    return gradient, hessian
