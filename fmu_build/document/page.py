@@ -27,7 +27,7 @@ from fmu_build.interface.model_description import role_attributes
 from fmu_build.interface.names import Naming
 from fmu_build.interface.variable_table import Role, TableEntry
 from fmu_build.versions import VERSIONS
-from supervessel.composite.docks import joints, switchable
+from supervessel.composite.docks import Joint, joints, switchable
 from supervessel.composite.start import principal_moments
 from supervessel.drawing.geometry import Assembly
 from supervessel.rotation.propagators import description
@@ -100,7 +100,7 @@ def page(
         facts=_facts(scene, fmi),
         picture=picture,
         vessels=_vessels(parts),
-        ports=_ports(scene) + _points(scene) + _wheels(scene),
+        ports=_mounts(scene) + _ports(scene) + _points(scene) + _wheels(scene),
         composite=_composite(parts.whole),
         naming=NAMINGS_SAID[entries[0].naming],
         variables=_variables(entries),
@@ -123,7 +123,8 @@ def _whole(scene: Scene) -> str:
     """Returns what the FMU describes, in words."""
     count = len(scene.vessels)
     docked = " that dock and undock" if scene.inputs.docked else ""
-    kind = "vessels" if docked else "docked vessels"
+    together = "joined" if scene.mounts else "docked"
+    kind = "vessels" if docked else f"{together} vessels"
     return f"an assembly of {count} {kind}{docked}" if count > 1 else f"the vessel {escape(scene.root)}"
 
 
@@ -158,7 +159,7 @@ def _vessels(parts: Assembly) -> str:
     rows: list[tuple[Cell, ...]] = []
     for number, (name, (R_root_vessel, origin)) in enumerate(parts.poses.items(), start=1):
         vessel = scene.vessels[name]
-        on = " to ".join(hung[name].ports) if name in hung else "root"
+        on = _joined_by(hung[name]) if name in hung else "root"
         with np.errstate(all="ignore"):
             centre = origin + R_root_vessel @ np.array(vessel.centre_of_mass)
         moments = _moments(vessel)
@@ -169,6 +170,19 @@ def _vessels(parts: Assembly) -> str:
     head = ("", "vessel", "mass [kg]", "given as", "moments", "centre of mass [m]", "docked")
     caption = "Vessels, in vessel axes; last column: centre of mass in the root vessel's axes"
     return table(caption, (*head, "in root axes [m]"), rows)
+
+
+def _joined_by(joint: Joint) -> str:
+    """Returns how a vessel is joined to the one before it."""
+    return " to ".join(joint.ports) if joint.mount is None else f"mounted to {joint.parent}"
+
+
+def _mounts(scene: Scene) -> str:
+    """Returns the table of mounts; nothing where there are none."""
+    rows = [(mount.child, mount.parent, mount.position, mount.attitude) for mount in scene.mounts]
+    head = ("vessel", "mounted to", "position [m]", "attitude (w, x, y, z)")
+    caption = "Mounts: poses of vessels in the axes of those that they are mounted to"
+    return table(caption, head, rows) if rows else ""
 
 
 def _moments(vessel: Vessel) -> tuple[str, Cell]:

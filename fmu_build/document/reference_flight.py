@@ -21,7 +21,7 @@ from supervessel.equations import Equations, composite_slices, p_start
 from supervessel.orbit import gravity_inputs, orbit_problem, two_body
 from supervessel.rotation.changes import followed
 from supervessel.scene.inputs import CONTACT_RATE, MASS, TORQUE, part_of
-from supervessel.scene.schema import Dock, Scene
+from supervessel.scene.schema import Dock, Mount, Scene
 from supervessel.scene.variables import InputVariable
 
 STEPS = 50
@@ -247,7 +247,7 @@ def _dock_that_switches(model: Equations) -> Dock | None:
     start = p_start(scene)
     before = _composite(model, start)
     for dock in (dock for dock in scene.docks if switchable(scene, dock)):
-        if not dock.docked and not _makes_a_tree([*(d for d in scene.docks if d.docked), dock]):
+        if not dock.docked and not _makes_a_tree([*(d for d in scene.docks if d.docked), dock], scene.mounts):
             continue
         after = start.copy()
         flag = model.names.p.index(f"{dock.name}.docked")
@@ -258,8 +258,8 @@ def _dock_that_switches(model: Equations) -> Dock | None:
     return None
 
 
-def _makes_a_tree(docks: Sequence[Dock]) -> bool:
-    """Whether docks, all closed, take each port once and make no loop."""
+def _makes_a_tree(docks: Sequence[Dock], mounts: Sequence[Mount]) -> bool:
+    """Whether docks, all closed, take each port once and with mounts, which make none, make no loop."""
     home: dict[str, str] = {}
 
     def found(vessel: str) -> str:
@@ -267,6 +267,8 @@ def _makes_a_tree(docks: Sequence[Dock]) -> bool:
             vessel = home[vessel]
         return vessel
 
+    for mount in mounts:
+        home[found(mount.child)] = found(mount.parent)
     ports = [port for dock in docks for port in dock.ports]
     for dock in docks:
         one, other = (found(part_of(port)[0]) for port in dock.ports)

@@ -47,9 +47,15 @@ def change_tables(model: Equations) -> str:
 
 
 def _dock_rows(model: Equations) -> list[str]:
-    """Returns the rows of DOCKS: names of ports and vessels, numbers of vessels, places in p and k or -1."""
+    """Returns the rows of DOCKS: names of ports and vessels, numbers of vessels, places in p and k or -1.
+
+    Vessels that mounts join have one number: C judges by it which vessels are joined.
+    """
     scene = model.resolved.scene
     vessels = {name: number for number, name in enumerate(scene.vessels)}
+    for mount in scene.mounts:
+        kept, replaced = vessels[mount.parent], vessels[mount.child]
+        vessels = {name: kept if number == replaced else number for name, number in vessels.items()}
     rows = []
     for dock in scene.docks:
         one, other = dock.ports

@@ -25,7 +25,7 @@ EXPECTED = {
     "dict_type": "a table",
     "model_type": "a table",
     "model_attributes_type": "a table",
-    "tuple_type": "an array of tables, written [[docks]]",
+    "tuple_type": "an array of tables, written [[{key}]]",
 }
 
 
@@ -99,8 +99,8 @@ def _explain(error: Any) -> list[str]:
     if kind == "extra_forbidden":
         table = key_path(place[:-1])
         return [(f"{table}: " if table else "") + unknown("key", str(place[-1]), known_keys(place[:-1]))]
-    expected = EXPECTED.get(kind)
-    return [f"{path} = {quantity(error['input'])}: must be {expected or error['msg']}"]
+    expected = EXPECTED[kind].format(key=place[-1]) if kind in EXPECTED else error["msg"]
+    return [f"{path} = {quantity(error['input'])}: must be {expected}"]
 
 
 def _range_problems(scene: Scene) -> list[str]:

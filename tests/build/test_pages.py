@@ -103,7 +103,8 @@ def test_the_tables_of_the_page_on_changes_make_a_scene():
 
 
 def test_the_vessels_of_the_page_on_scenes_are_one():
-    (block,) = map(tomllib.loads, blocks("model/docs/scene.md", "toml"))
+    block, mounts = map(tomllib.loads, blocks("model/docs/scene.md", "toml"))
+    assert len(parse_scene(body() | block | mounts | {"root": "tug"}).mounts) == 1
     tug, same = (
         parse_scene(body() | {"root": name, "vessels": {name: vessel}}).vessels[name]
         for name, vessel in block["vessels"].items()

@@ -16,7 +16,7 @@ from supervessel.composite.docks import Joint, VesselGroup
 from supervessel.composite.inertia import combine_numbers, orbiter_moments, placed_body
 from supervessel.composite.poses import Pose, constant, from_anchor, mated_pose, port_axes, scaled
 from supervessel.scene.inputs import vessel_of
-from supervessel.scene.schema import Port, Scene, Vessel
+from supervessel.scene.schema import ORIGIN, Mount, Port, Scene, Vessel
 
 Places = Mapping[str, Pose]
 """Poses of vessels, whose origins are their anchors, constants, in the axes of their group."""
@@ -24,7 +24,7 @@ Places = Mapping[str, Pose]
 
 def places(scene: Scene, parts: Sequence[VesselGroup]) -> list[Places]:
     """Returns of each rigid group the poses of its vessels in its axes, by name."""
-    steps = iter(_mated_poses(scene, [joint for part in parts for joint in part.joints]))
+    steps = iter(_joint_poses(scene, [joint for part in parts for joint in part.joints]))
     found: list[Places] = []
     for part in parts:
         inside = {part.reference: Pose(constant(np.eye(3)), constant(np.zeros(3)))}
@@ -92,8 +92,50 @@ def port_frame(port: Port) -> NDArray[np.float64]:
     return np.array(ca.evalf(port_axes(constant(scaled(port.direction)), constant(scaled(port.alignment)))))
 
 
-def _mated_poses(scene: Scene, joints: Sequence[Joint]) -> list[Pose]:
+def _joint_poses(scene: Scene, joints: Sequence[Joint]) -> list[Pose]:
     """Returns the pose of the child in the parent's axes of each joint, none of whose ports moves."""
+    mated = iter(_mated_poses(scene, [joint for joint in joints if joint.mount is None]))
+    mounted = iter(_mounted_poses(scene, [joint for joint in joints if joint.mount is not None]))
+    return [next(mated if joint.mount is None else mounted) for joint in joints]
+
+
+def mount_rotation(mount: Mount) -> NDArray[np.float64]:
+    """Returns R_parent_child, (3, 3), of a mount.
+
+    Each element is over the square of the quaternion's length: quarter turns, whose numbers are rounded, then
+    give 0 and 1 exactly. Source: [EQ] Conventions, eq. (1), of a quaternion of any length.
+    """
+    w, x, y, z = mount.attitude
+    ww, xx, yy, zz = w * w, x * x, y * y, z * z
+    rows = [
+        [(ww + xx) - (yy + zz), 2.0 * (x * y - w * z), 2.0 * (z * x + w * y)],
+        [2.0 * (x * y + w * z), (ww + yy) - (zz + xx), 2.0 * (y * z - w * x)],
+        [2.0 * (z * x - w * y), 2.0 * (y * z + w * x), (ww + zz) - (xx + yy)],
+    ]
+    return np.array(rows) / ((ww + xx) + (yy + zz))
+
+
+def _mounted_poses(scene: Scene, joints: Sequence[Joint]) -> list[Pose]:
+    """Returns the pose of the child in the parent's axes of each joint, all of them mounts.
+
+    As with ports: the place in the parent less R times that in the child, here the origin of one of the two.
+    """
+    rotations, here, there = [], [], []
+    for joint in joints:
+        mount = joint.mount
+        assert mount is not None
+        R_parent_child, forwards = mount_rotation(mount), mount.parent == joint.parent
+        rotations.append(R_parent_child if forwards else R_parent_child.T)
+        here.append(from_anchor(scene, joint.parent, mount.position if forwards else ORIGIN))
+        there.append(from_anchor(scene, joint.child, ORIGIN if forwards else mount.position))
+    if not joints:
+        return []
+    origins = _mounted()(np.hstack(rotations), np.array(here).T, np.array(there).T)
+    return _poses(ca.DM(np.hstack(rotations)), origins)
+
+
+def _mated_poses(scene: Scene, joints: Sequence[Joint]) -> list[Pose]:
+    """Returns the pose of the child in the parent's axes of each joint, all of them pairs of ports."""
     if not joints:
         return []
     ports = [[(joint.ports[side], scene.port(joint.ports[side])) for joint in joints] for side in (0, 1)]
@@ -106,7 +148,11 @@ def _mated_poses(scene: Scene, joints: Sequence[Joint]) -> list[Pose]:
             [scaled(port.alignment) for _, port in side],
         )
     ]
-    rotations, origins = _mated()(*numbers)
+    return _poses(*_mated()(*numbers))
+
+
+def _poses(rotations: ca.DM, origins: ca.DM) -> list[Pose]:
+    """Returns n poses of rotations (3, 3 n) and origins (3, n) [m]."""
     return [
         Pose(rotation, origin)
         for rotation, origin in zip(
@@ -125,6 +171,13 @@ def _mated() -> ca.Function:
     parent, child = ((vectors[i], port_axes(*vectors[i + 1 : i + 3])) for i in (0, 3))
     pose = mated_pose(parent, child)
     return ca.Function("mated", vectors, [pose.rotation, pose.origin])
+
+
+@cache
+def _mounted() -> ca.Function:
+    """Returns the function from R and one place, in the parent and in the child, to the child's origin."""
+    R_parent_child, here, there = ca.SX.sym("rotation", 3, 3), ca.SX.sym("here", 3), ca.SX.sym("there", 3)
+    return ca.Function("mounted", [R_parent_child, here, there], [here - R_parent_child @ there])
 
 
 @cache

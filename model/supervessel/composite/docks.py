@@ -1,11 +1,11 @@
-"""The docks of a scene as a graph: rigid groups of vessels, and the ways by which they hang on the root."""
+"""Docks and mounts as a graph: rigid groups of vessels, and the ways by which they hang on the root."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from supervessel.scene.inputs import part_of
-from supervessel.scene.schema import Dock, Scene
+from supervessel.scene.schema import Dock, Mount, Scene
 
 MOST_WAYS = 64
 """Most ways by which a vessel may hang on the root. Each way has a pose of its own in the equations."""
@@ -23,9 +23,11 @@ class TooManyWaysError(ValueError):
 
 @dataclass(frozen=True)
 class Joint:
-    """A mated pair of ports, seen from the root: the parent is placed before the child.
+    """A mated pair of ports, or a mount, seen from the root: the parent is placed before the child.
 
-    dock : name of the input that closes it; None: always closed
+    parent_port, child_port : names of the ports in their vessels, "" for a mount
+    dock                    : name of the input that closes it; None: always closed
+    mount                   : the scene's mount; its parent may be the child here. None for a pair of ports
     """
 
     parent: str
@@ -33,16 +35,17 @@ class Joint:
     child: str
     child_port: str
     dock: str | None = None
+    mount: Mount | None = None
 
     @property
     def ports(self) -> tuple[str, str]:
-        """Names of the two ports, "vessel.port", the parent's first."""
+        """Names of the two ports, "vessel.port", the parent's first; not of a mount."""
         return f"{self.parent}.{self.parent_port}", f"{self.child}.{self.child_port}"
 
 
 @dataclass(frozen=True)
 class VesselGroup:
-    """Vessels held together by docks that are always closed and whose ports have no pose input.
+    """Vessels that mounts hold together, and docks that are always closed and whose ports have no pose input.
 
     reference : the vessel whose axes are those of the group
     joints    : the joints to its other vessels, parents first
@@ -108,7 +111,7 @@ class Way:
 
 
 def joints(scene: Scene) -> Iterator[Joint]:
-    """Yields the docks closed at the start so that every parent is the root or an earlier joint's child."""
+    """Yields mounts and docks closed at the start: every parent is the root or an earlier one's child."""
     return _spread(scene.root, _neighbours(scene, [dock for dock in scene.docks if dock.docked]))
 
 
@@ -238,7 +241,10 @@ def switchable(scene: Scene, dock: Dock) -> bool:
 
 
 def _neighbours(scene: Scene, docks: Sequence[Dock]) -> dict[str, list[Joint]]:
-    """Returns by vessel the joints that start from it, one for each of its docks."""
+    """Returns by vessel the joints that start from it, one for each of its docks, then of its mounts.
+
+    docks : those that count; all mounts do
+    """
     neighbours: dict[str, list[Joint]] = {}
     for dock in docks:
         name = dock.name if switchable(scene, dock) else None
@@ -246,6 +252,9 @@ def _neighbours(scene: Scene, docks: Sequence[Dock]) -> dict[str, list[Joint]]:
             (parent, parent_port), (child, child_port) = part_of(here), part_of(there)
             joint = Joint(parent, parent_port, child, child_port, name)
             neighbours.setdefault(parent, []).append(joint)
+    for mount in scene.mounts:
+        for parent, child in ((mount.parent, mount.child), (mount.child, mount.parent)):
+            neighbours.setdefault(parent, []).append(Joint(parent, "", child, "", mount=mount))
     return neighbours
 
 

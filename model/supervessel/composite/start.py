@@ -75,8 +75,8 @@ def principal_moments(elements: Sequence[float] | NDArray[np.float64]) -> NDArra
 def poses_at_start(scene: Scene) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Returns R_root_vessel, (3, 3), and origin, (3,) [m], root axes, of vessels as they stand at the start.
 
-    Of the root, which is the first, and of every vessel that docks closed at the start join to it, in the
-    scene's order. Source: [EQ] The assembly, eq. (4).
+    Of the root, which is the first, and of every vessel that mounts and docks closed at the start join to it,
+    in the scene's order. Source: [EQ] The assembly, eq. (4).
     """
     still = _attached(scene)
     (group,) = groups(still)
@@ -90,8 +90,10 @@ def poses_at_start(scene: Scene) -> dict[str, tuple[NDArray[np.float64], NDArray
 
 
 def _attached(scene: Scene) -> Scene:
-    """Returns the part of a scene that docks closed at the start join to the root, without inputs."""
+    """Returns what mounts and docks closed at the start join to the root as a scene without inputs."""
     names = {scene.root, *(joint.child for joint in joints(scene))}
     closed = tuple(dock for dock in scene.docks if dock.docked and vessel_of(dock.ports[0]) in names)
     vessels = {name: vessel for name, vessel in scene.vessels.items() if name in names}
-    return scene.model_copy(update={"vessels": vessels, "docks": closed, "inputs": Inputs()})
+    mounts = tuple(mount for mount in scene.mounts if mount.parent in names)
+    changed = {"vessels": vessels, "docks": closed, "mounts": mounts, "inputs": Inputs()}
+    return scene.model_copy(update=changed)

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supervessel.scene.schema import ORIGIN, Dock, Scene
+from supervessel.reference.attitude import rotation_matrix
+from supervessel.scene.schema import ORIGIN, Dock, Mount, Scene
 
 Array = NDArray[np.float64]
 
@@ -162,7 +163,8 @@ def _cross(a: Array, b: Array) -> Array:
 def closed_docks(scene: Scene, values: Mapping[str, float] | None = None) -> list[Dock]:
     """Returns the docks that are closed: for ever, or as their inputs say.
 
-    Raises ValueError if two of them share a port, or if they join two vessels that are joined already.
+    Raises ValueError if two of them share a port, or if they join two vessels that docks or mounts join
+    already.
 
     Example:
         >>> [dock.ports for dock in reference.closed_docks(scene)]
@@ -171,6 +173,9 @@ def closed_docks(scene: Scene, values: Mapping[str, float] | None = None) -> lis
     closed: list[Dock] = []
     occupied: set[str] = set()
     part = {vessel: {vessel} for vessel in scene.vessels}
+    for mount in scene.mounts:
+        joined_vessels = part[mount.parent] | part[mount.child]
+        part |= dict.fromkeys(joined_vessels, joined_vessels)
     for dock in scene.docks:
         if dock.name in scene.inputs.docked and not (values or {}).get(f"{dock.name}.docked", dock.docked):
             continue
@@ -189,7 +194,7 @@ def closed_docks(scene: Scene, values: Mapping[str, float] | None = None) -> lis
 
 
 def motions(scene: Scene, values: Mapping[str, float] | None = None) -> dict[str, Motion]:
-    """Returns how each vessel that closed docks join to the root is placed and moves; the root first.
+    """Returns how each vessel that mounts and closed docks join to the root stands and moves; the root first.
 
     Ports are mated face to face with their alignments together: R d_B = -d_A, R a_B = a_A. A port that moves
     takes its mate along.
@@ -201,20 +206,21 @@ def motions(scene: Scene, values: Mapping[str, float] | None = None) -> dict[str
     """
     at_rest = np.zeros(3)
     placed = {scene.root: Motion(np.eye(3), at_rest, at_rest, at_rest)}
-    waiting, left = closed_docks(scene, values), -1
+    waiting: list[tuple[str, str, _MovingPort, _MovingPort]] = []
+    for dock in closed_docks(scene, values):
+        here, there = (_port(scene, name, values) for name in dock.ports)
+        waiting.append((*(name.partition(".")[0] for name in dock.ports), here, there))  # type: ignore[arg-type]
+    waiting += [(mount.parent, mount.child, *_mount_points(mount)) for mount in scene.mounts]
+    left = -1
     while len(waiting) != left:
-        docks, waiting, left = waiting, [], len(waiting)
-        for dock in docks:
-            here, there = dock.ports
-            if there.partition(".")[0] in placed:
-                here, there = there, here
-            parent, child = here.partition(".")[0], there.partition(".")[0]
-            if parent in placed:
-                placed[child] = _mated(
-                    placed[parent], _port(scene, here, values), _port(scene, there, values)
-                )
+        pairs, waiting, left = waiting, [], len(waiting)
+        for one, other, here, there in pairs:
+            if one in placed:
+                placed[other] = _mated(placed[one], here, there)
+            elif other in placed:
+                placed[one] = _mated(placed[other], there, here)
             else:
-                waiting.append(dock)
+                waiting.append((one, other, here, there))
     return placed
 
 
@@ -248,6 +254,13 @@ def _port(scene: Scene, name: str, values: Mapping[str, float] | None) -> _Movin
         vector(f"{name}.velocity", ORIGIN, values),
         vector(f"{name}.rate", ORIGIN, values),
     )
+
+
+def _mount_points(mount: Mount) -> tuple[_MovingPort, _MovingPort]:
+    """Returns a mount as two ports at rest: at its position in the parent, at the origin of the child."""
+    at_rest, facing = np.zeros(3), np.array([-1.0, 1.0, -1.0])
+    here = _MovingPort(np.array(mount.position), rotation_matrix(mount.attitude) * facing, at_rest, at_rest)
+    return here, _MovingPort(at_rest, np.eye(3), at_rest, at_rest)
 
 
 def _mated(parent: Motion, here: _MovingPort, there: _MovingPort) -> Motion:

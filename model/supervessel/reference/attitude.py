@@ -1,9 +1,9 @@
 """Attitudes: the rotation matrix of a quaternion, the quaternion of a matrix, the rate of a quaternion."""
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from supervessel.reference.assembly import Array
+Array = NDArray[np.float64]
 
 
 def rotation_matrix(attitude: ArrayLike) -> Array:

@@ -1,11 +1,11 @@
-"""Problems of names in a scene: unknown or ill-formed names, and docks that do not make one tree of vessels.
+"""Problems of names in a scene: unknown or ill-formed names, docks and mounts that make no tree of vessels.
 
 The raw tables of a file are checked, so that a wrong name is reported beside a wrong number.
 """
 
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
@@ -189,8 +189,8 @@ def _port_problem(name: object, ports: Ports, kind: str = "port") -> str:
 
 
 def _docks(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
-    """Yields problems of the docks: the docks closed at the start must make no loop, and all docks together
-    must connect every vessel with the root."""
+    """Yields problems of docks and mounts: those closed at the start must make no loop, and all of them
+    together must connect every vessel with the root."""
     switched = _named(_table(raw, "inputs"), "docked")
     closed, reached = ({vessel: {vessel} for vessel in ports} for _ in range(2))
     taken: dict[str, str] = {}
@@ -226,14 +226,60 @@ def _docks(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:
                 loop, joined = " - ".join(map(printable, names)), " and ".join(map(printable, vessels))
                 yield f"{place}: {loop} closes a loop; {joined} are joined already"
             for component in (reached,) if open_at_start else (closed, reached):
-                small, large = sorted((component[vessel] for vessel in vessels), key=len)
-                large |= small
-                component.update(dict.fromkeys(small, large))
+                _join(component, vessels)
         if not open_at_start:
             taken |= dict.fromkeys(names, f"docks[{number}]")
         if not switchable:
             always |= dict.fromkeys(names, f"docks[{number}]")
+    yield from _mounts(raw, ports, closed, reached)
+    complete = complete and all(_joined_vessels(mount, ports) for mount in _list(raw, "mounts"))
     yield from _root(raw, reached if complete else {}, ports)
+
+
+def _mounts(
+    raw: Mapping[str, Any], ports: Ports, closed: dict[str, set[str]], reached: dict[str, set[str]]
+) -> Iterator[str]:
+    """Yields problems of the mounts; joins their vessels, in `closed` and in `reached`."""
+    for number, mount in enumerate(_list(raw, "mounts"), start=1):
+        place, vessels = f"mounts[{number}]", _joined_vessels(mount, ports)
+        if isinstance(mount, Mapping) and "ports" in mount:
+            rule = "a mount has none; ports are mated under [[docks]]"
+            yield f"{place}.ports = {quantity(mount['ports'])}: {rule}"
+        if not vessels:
+            yield from _misnamed_vessels(place, mount, ports)
+        elif vessels[0] == vessels[1]:
+            yield f"{place}: parent and child are both {printable(vessels[0])}; a mount joins two vessels"
+        else:
+            if closed[vessels[0]] is closed[vessels[1]]:
+                yield f"{place}: closes a loop; {' and '.join(map(printable, vessels))} are joined already"
+            for component in (closed, reached):
+                _join(component, vessels)
+
+
+def _joined_vessels(mount: Any, ports: Ports) -> list[str]:
+    """Returns parent and child of a mount, [] where it does not name two vessels."""
+    names = [mount.get(key) for key in ("parent", "child")] if isinstance(mount, Mapping) else [None]
+    return [name for name in names if isinstance(name, str)] if all(name in ports for name in names) else []
+
+
+def _misnamed_vessels(place: str, mount: Any, ports: Ports) -> Iterator[str]:
+    """Yields why parent and child of a mount are no vessels, where they are names."""
+    for key in ("parent", "child"):
+        name = mount.get(key) if isinstance(mount, Mapping) else None
+        if not isinstance(name, str) or name in ports:
+            continue
+        if _is_port(name, ports):
+            rule = "must be a vessel, and is a port; ports are mated under [[docks]]"
+            yield f"{place}.{key} = {quantity(name)}: {rule}"
+        else:
+            yield f"{place}.{key}: {unknown('vessel', name, ports)}"
+
+
+def _join(component: dict[str, set[str]], vessels: Sequence[str]) -> None:
+    """Makes one of the sets of vessels, by vessel, that two vessels are in."""
+    small, large = sorted((component[vessel] for vessel in vessels), key=len)
+    large |= small
+    component.update(dict.fromkeys(small, large))
 
 
 def _root(raw: Mapping[str, Any], component: Mapping[str, set[str]], ports: Ports) -> Iterator[str]:
@@ -243,9 +289,10 @@ def _root(raw: Mapping[str, Any], component: Mapping[str, set[str]], ports: Port
     if root not in ports:
         yield f"root: {unknown('vessel', root, ports)}"
         return
+    means = "docks or mounts" if _list(raw, "mounts") else "docks"
     for vessel, part in component.items():
         if part is not component[root]:
-            yield f"vessels.{toml_key(vessel)}: is not reached from the root {printable(root)} by docks"
+            yield f"vessels.{toml_key(vessel)}: is not reached from the root {printable(root)} by {means}"
 
 
 def _inputs(raw: Mapping[str, Any], ports: Ports) -> Iterator[str]:

@@ -214,6 +214,20 @@ class Dock(Table):
     docked: Flag = True
 
 
+class Mount(Table):
+    """A vessel, the child, that is fixed to another one, the parent, without ports.
+
+    position : of the origin of the child's axes, in the parent's [m]
+    attitude : q_parent_child, (w, x, y, z): takes components in the child's axes to those in the parent's;
+               normalised when read
+    """
+
+    parent: Name
+    child: Name
+    position: Position
+    attitude: Attitude = (1.0, 0.0, 0.0, 0.0)
+
+
 class Inputs(Table):
     """What may change while the scene runs; everything else is a constant.
 
@@ -352,6 +366,7 @@ class Scene(Table):
     convention: Annotated[Convention, _one_of(*get_args(Convention))] = "rigid_body"
     vessels: dict[str, Vessel]
     docks: tuple[Dock, ...] = ()
+    mounts: tuple[Mount, ...] = ()
     inputs: Inputs = Inputs()
     gravity: Gravity | None = None
     rotation: Rotation = Rotation()
@@ -523,6 +538,7 @@ TABLES: dict[tuple[str, ...], type[Table]] = {
     ("vessels", "*", "points", "*"): Point,
     ("vessels", "*", "wheels", "*"): Wheel,
     ("docks", "*"): Dock,
+    ("mounts", "*"): Mount,
     ("inputs",): Inputs,
     ("gravity",): Gravity,
     ("rotation",): Rotation,
