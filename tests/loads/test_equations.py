@@ -47,6 +47,20 @@ def test_a_dock_that_is_open_or_off_the_root_carries_nothing():
     assert not np.any(loads)
 
 
+def test_what_is_mounted_beyond_a_dock_hangs_on_it():
+    raw = dumbbell((300.0, 500.0), (4.0, 2.5))
+    boom = {"mass": 40.0, "pmi": [0.1, 2.0, 2.0]}
+    mount = {"parent": "B", "child": "boom", "position": [0.5, 3.0, 0.0], "attitude": [0.9, 0.1, -0.3, 0.3]}
+    other = {"parent": "dish", "child": "A", "position": [0.0, -1.0, 2.0]}
+    vessels = raw["vessels"] | {"boom": boom, "dish": boom | {"mass": 70.0}}
+    for root in vessels:
+        flown = scene(variant(raw, {"vessels": vessels, "mounts": [mount, other], "root": root}))
+        x = np.array([1.0, 0, 0, 0, 0.3, -0.2, 0.5])
+        found, true = shown(flown, x, {}), reference.loads(flown, x)
+        for kind in DOCK_OUTPUTS:
+            assert np.abs(found[f"bar.{kind}"] - true[f"bar.{kind}"]).max() <= AGREEMENT * largest(true, kind)
+
+
 # The sum over everything: a load from the vessels on one side of a dock is that from those on the other
 
 

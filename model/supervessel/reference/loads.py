@@ -11,7 +11,7 @@ from supervessel.reference.attitude import rotation_matrix
 from supervessel.reference.rotation import net_force, ode
 from supervessel.reference.wheels import wheels_of
 from supervessel.scene.outputs import POINT_OUTPUTS
-from supervessel.scene.schema import ORIGIN, Dock, Scene
+from supervessel.scene.schema import ORIGIN, Scene
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,8 @@ def loads(scene: Scene, state: ArrayLike, values: Mapping[str, float] | None = N
         force, moment = np.zeros(3), np.zeros(3)
         first = dock.ports[0].partition(".")[0]
         if dock in closed and first in found:
-            near = _reached(scene.root, [one for one in closed if one is not dock])
+            pairs = [{port.partition(".")[0] for port in one.ports} for one in closed if one is not dock]
+            near = _reached(scene.root, [*pairs, *({mount.parent, mount.child} for mount in scene.mounts)])
             position = vector(f"{dock.ports[0]}.position", scene.port(dock.ports[0]).position, values)
             port, _ = found[first].carry(position)
             force, moment = _load(scene, set(found) - near, port, now)
@@ -113,13 +114,12 @@ def loads(scene: Scene, state: ArrayLike, values: Mapping[str, float] | None = N
     return outputs
 
 
-def _reached(root: str, docks: list[Dock]) -> set[str]:
-    """Returns the vessels that docks join to the root."""
+def _reached(root: str, pairs: list[set[str]]) -> set[str]:
+    """Returns the vessels that pairs of joined vessels join to the root."""
     reached, grown = {root}, True
     while grown:
         grown = False
-        for dock in docks:
-            pair = {port.partition(".")[0] for port in dock.ports}
+        for pair in pairs:
             if len(pair & reached) == 1:
                 reached, grown = reached | pair, True
     return reached
