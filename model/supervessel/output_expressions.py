@@ -16,6 +16,7 @@ from supervessel.composite.wheels import (
     axes_of,
     free_inertia,
     momentum_of_vessel,
+    wheel_energy,
     wheel_outputs,
 )
 from supervessel.rotation.attitude import to_body, to_inertial, unit
@@ -85,6 +86,16 @@ def _momentum(known: Known) -> ca.SX:
     return to_inertial(known.attitude, momentum)
 
 
+def _energy(known: Known) -> ca.SX:
+    """Returns (J - A) omega . omega/2 + omega . h, what parts have that move, and wheels, [J]."""
+    energy = 0.5 * ca.dot(known.omega, known.turned) + known.parts["moving"]
+    if "momentum" in known.parts:
+        energy += ca.dot(known.omega, known.parts["momentum"][:3])
+    return (
+        energy if known.wheels is None else energy + wheel_energy(known.resolved, known.wheels, known.stored)
+    )
+
+
 EXPRESSIONS: dict[str, Callable[[Known], ca.SX]] = {
     "mass": lambda known: known.parts["mass"],
     "barycentre": lambda known: known.parts["barycentre"],
@@ -93,6 +104,7 @@ EXPRESSIONS: dict[str, Callable[[Known], ca.SX]] = {
     "angular_velocity": lambda known: known.omega,
     "attitude": lambda known: known.attitude,
     "kinetic_energy": lambda known: 0.5 * ca.dot(known.omega, known.turned),
+    "total_kinetic_energy": _energy,
     "angular_momentum": _momentum,
     "principal_moments": lambda known: known.parts["principal"][:3],
     "principal_axes": lambda known: known.parts["principal"][3:],

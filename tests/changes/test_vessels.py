@@ -10,7 +10,7 @@ from hypothesis import Phase, given, settings
 from changes.histories import Values, assembly, elements, happening, start_values
 from supervessel import Scene, Twin, reference
 from supervessel.scene.outputs import VESSEL_OUTPUTS
-from support import EPS, flying, scene, variant
+from support import EPS, OK, flying, scene, variant
 
 AGREEMENT = 1000 * EPS
 """Of the largest number of an output's kind: poses go down a chain of up to five vessels, each of a few dozen
@@ -94,3 +94,40 @@ def test_the_fmu_shows_a_vessel_while_it_is_docked():
             truth = reference.vessel_outputs(flown, [1, 0, 0, 0, 0, 0, 0], values)[f"{child}.attitude"]
             assert abs(abs(attitude @ truth) - float(truth.any())) <= AGREEMENT
             assert attitude.any() == truth.any()
+
+
+@settings(deadline=None, derandomize=True, max_examples=20, phases=(Phase.explicit, Phase.generate))
+@given(seed=st.integers(0, 10**6), count=st.integers(2, 7), wheels=st.booleans())
+def test_the_whole_energy_is_that_of_all_points_and_wheels(seed, count, wheels):
+    flown = scene(variant(assembly(seed, count, wheels=wheels), {"outputs.names": ["total_kinetic_energy"]}))
+    values, rng = moved(flown, seed), np.random.default_rng(seed)
+    for port in flown.inputs.motion:
+        values |= elements(f"{port}.velocity", rng.normal(size=3)) | elements(
+            f"{port}.rate", rng.normal(size=3)
+        )
+    x = np.append(state(seed), 50.0 * rng.normal(size=len(flown.wheels)))
+    found = twins_outputs(flown, x, values)["total_kinetic_energy"][0]
+    true = reference.total_kinetic_energy(flown, x, values)
+    assert abs(found - true) <= AGREEMENT * true
+
+
+def test_what_motors_do_is_the_work_that_the_whole_energy_gains():
+    # A motor spins up a wheel of a free body: E' = u (speed of the wheel).
+    raw = variant(
+        assembly(1, 3, moving=0, others=0, wheels=True), {"outputs.names": ["total_kinetic_energy"]}
+    )
+    wheel = next(name for name in scene(raw).wheels if scene(raw).wheel(name).inertia > 0.0)
+    raw = variant(raw, {"outputs.names": ["total_kinetic_energy", f"{wheel}.speed"], "inputs.docked": []})
+    for dock in raw["docks"]:
+        dock["docked"] = True
+    with flying(raw) as instance:
+        assert instance.set({f"{wheel}.torque": 0.5}) == OK
+        begin, h = instance.get("total_kinetic_energy"), 0.01
+        speeds = [instance.get(f"{wheel}.speed")]
+        for _ in range(100):
+            assert instance.step(h) == OK
+            speeds.append(instance.get(f"{wheel}.speed"))
+        s = np.array(speeds)
+        work = 0.5 * h / 3.0 * (s[0] + s[-1] + 4.0 * s[1::2].sum() + 2.0 * s[2:-1:2].sum())  # Simpson's rule
+        gained = instance.get("total_kinetic_energy") - begin
+        assert abs(gained - work) <= 1e-9 * abs(work) + 1e-12 * begin

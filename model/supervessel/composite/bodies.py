@@ -96,6 +96,27 @@ def group_bodies(
     return [b.seen_from(pose.rotation, pose.origin, pose.velocity, pose.rate) for b in lumped]
 
 
+def energy_of_motion(resolved: ResolvedScene, lookup: Lookup, whole: Body) -> ca.SX:
+    """Returns the kinetic energy of parts that move relative to the root's axes, [J]; 0 where none does.
+
+    whole : the composite as one body
+    Sum of m_j |v_j - v|^2/2 + w_j . J_j w_j/2 in the root's axes, v_j the velocity of the centre of mass of
+    body j and w_j its rate, v the barycentre's velocity. Wheels count as locked.
+    """
+    energy = ca.SX(0.0)
+    if whole.velocity is None:
+        return energy
+    placed_all = placed_groups(resolved, lookup)
+    for number, (group, placed) in enumerate(zip(resolved.groups, placed_all, strict=True)):
+        for body in group_bodies(resolved, number, group, placed, lookup):
+            drift = -whole.velocity if body.velocity is None else body.velocity - whole.velocity
+            own = body.mass * ca.sumsqr(drift)
+            if body.spin is not None and placed.pose.rate is not None:
+                own += ca.dot(placed.pose.rate, body.spin)
+            energy += 0.5 * (own if placed.attached is None else placed.attached * own)
+    return energy
+
+
 def by_convention(scene: Scene, whole: Body) -> Body:
     """Returns the composite under the scene's convention: Orbiter's leaves the products of inertia out."""
     if scene.convention == "orbiter":

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from supervessel.composite.actions import action_parts, vessel_parts
-from supervessel.composite.bodies import composite_body, lookup_in
+from supervessel.composite.bodies import composite_body, energy_of_motion, lookup_in
 from supervessel.composite.inertia import Body, ldl, ldl_inverse, upper_triangle
 from supervessel.composite.poses import anchor, constant
 from supervessel.composite.resolved import ResolvedScene
@@ -92,6 +92,8 @@ def composite_parts(resolved: ResolvedScene, p: ca.SX) -> dict[str, ca.SX]:
                     bounds |(J - A)^-1 (omega x h)|/|omega|
     lightness     : (1,) [1/(kg m2)], where there are wheels: trace((J - A)^-1)
     excess        : (1,), where there are wheels, see `growth_excess`
+    moving        : (1,) [J], where the output total_kinetic_energy is asked for: kinetic energy of parts that
+                    move relative to body axes, without what wheels would have of it if they were locked
     wheels, wheel_rates : see `composite.wheels.wheel_parts`
     moment, force : see `composite.actions.action_parts`
     .NAME         : of the vessel NAME, see `composite.actions.vessel_parts`, of a point, see
@@ -100,6 +102,9 @@ def composite_parts(resolved: ResolvedScene, p: ca.SX) -> dict[str, ca.SX]:
     lookup = lookup_in(resolved.shaping, p)
     body, wheels = composite_body(resolved, lookup), placed_wheels(resolved, lookup)
     parts = body_parts(resolved.scene, without_locked(body, wheels), wheels) | wheel_parts(wheels)
+    if "total_kinetic_energy" in resolved.scene.outputs.names:
+        locked = ca.SX(0.0) if wheels is None else wheels.locked_energy
+        parts["moving"] = energy_of_motion(resolved, lookup, body) - locked
     parts |= action_parts(resolved, lookup, body.centre) | vessel_parts(resolved, lookup, body)
     parts |= point_parts(resolved, lookup, body) | load_parts(resolved, lookup, body.centre, wheels)
     return {name: ca.densify(part) for name, part in parts.items()}

@@ -53,6 +53,11 @@ class WheelAxes:
         """A k summed over the wheels, each with the rate of its vessel, (3,) [N m s]; None: no port moves."""
         return None if self.rates is None else self.axes @ (ca.SX(list(self.inertias)) * self.rates)
 
+    @property
+    def locked_energy(self) -> ca.SX:
+        """k . A k/2 summed over the wheels, [J], each with the rate k of its vessel."""
+        return ca.SX(0.0) if self.rates is None else 0.5 * ca.dot(ca.SX(list(self.inertias)), self.rates**2)
+
 
 def axes_of(resolved: ResolvedScene, parts: Mapping[str, ca.SX]) -> WheelAxes | None:
     """Returns the wheels of a scene, None where it has none.
@@ -174,6 +179,20 @@ def wheel_outputs(
         speed, leaves = stored[w] / inertia - turned, may_leave(resolved, vessel_of(name))
         found[f"{name}.speed"] = ca.if_else(ca.sumsqr(axis) > 0.5, speed, 0.0) if leaves else speed
     return found
+
+
+def wheel_energy(resolved: ResolvedScene, wheels: WheelAxes, stored: ca.SX) -> ca.SX:
+    """Returns the sum of h_w^2/(2 I_w), [J], over the wheels that the body holds and that have inertia.
+
+    stored : h_w of each wheel, (n,) [N m s]
+    """
+    energy = ca.SX(0.0)
+    for w, name in enumerate(resolved.scene.wheels):
+        if wheels.inertias[w] > 0.0:
+            own = stored[w] ** 2 / (2.0 * wheels.inertias[w])
+            leaves = may_leave(resolved, vessel_of(name))
+            energy += ca.if_else(ca.sumsqr(wheels.axes[:, w]) > 0.5, own, 0.0) if leaves else own
+    return energy
 
 
 def momentum_of_vessel(scene: Scene, wheels: WheelAxes | None, vessel: str, stored: ca.SX) -> ca.SX | None:

@@ -35,6 +35,7 @@ from supervessel.reference.rotation import (
     momentum_ode,
     net_force,
     ode,
+    total_kinetic_energy,
     turning_tensor,
     vessel_outputs,
 )
@@ -73,6 +74,7 @@ __all__ = [
     "quaternion",
     "rotation_matrix",
     "sample_points",
+    "total_kinetic_energy",
     "turning_tensor",
     "vessel_outputs",
     "wheel_outputs",

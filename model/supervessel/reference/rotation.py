@@ -175,6 +175,27 @@ def momentum_ode(scene: Scene, state: ArrayLike, values: Mapping[str, float] | N
     return np.concatenate([attitude_dot(state[:4], omega), momentum_dot, motors])
 
 
+def total_kinetic_energy(scene: Scene, state: ArrayLike, values: Mapping[str, float] | None = None) -> float:
+    """Returns the kinetic energy relative to the barycentre, [J]: of all sample points, and of wheels.
+
+    state : (attitude, angular velocity, momenta of wheels), (7 + n,)
+    A wheel turns with its vessel among the points. That part is replaced by h^2/(2 I), or 0 where I is 0.
+
+    Example:
+        >>> round(reference.total_kinetic_energy(scene, [1, 0, 0, 0, 0, 0.0011, 0]))
+        198
+    """
+    state = np.asarray(state, dtype=float)
+    whole, own = joined(points(scene, values).values()), wheels_of(scene, state[7:], values)
+    drift = whole.masses @ whole.velocities / whole.masses.sum()
+    v = np.cross(state[4:7], whole.positions - whole.barycentre) + whole.velocities - drift
+    energy = 0.5 * whole.masses @ (v * v).sum(axis=1)
+    rates = own.axes @ state[4:7] + own.rates
+    heavy = (own.inertias > 0.0) & np.any(own.axes != 0.0, axis=1)
+    energy += 0.5 * (own.momenta[heavy] ** 2 / own.inertias[heavy]).sum() - 0.5 * own.inertias @ rates**2
+    return float(energy)
+
+
 def vessel_outputs(
     scene: Scene, state: ArrayLike, values: Mapping[str, float] | None = None
 ) -> dict[str, Array]:

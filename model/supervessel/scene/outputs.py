@@ -110,6 +110,13 @@ OUTPUTS: dict[str, OutputKind] = {
             nominal=lambda whole: 0.5 * whole.moment * whole.rate * whole.rate,
         ),
         OutputKind(
+            "total_kinetic_energy",
+            "J",
+            "kinetic energy relative to the barycentre, of parts that move and of wheels included",
+            (),
+            nominal=lambda whole: 0.5 * whole.moment * whole.rate * whole.rate,
+        ),
+        OutputKind(
             "angular_momentum",
             "N.m.s",
             "angular momentum about the barycentre, inertial axes",
