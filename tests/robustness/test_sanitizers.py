@@ -28,7 +28,7 @@ SUITE_TIME_LIMIT = 3600.0  # s; about ten minutes on two cores
 LIBRARIES = 100
 """The suite flies more of them; fewer would say that it flies others, without sanitizers."""
 PROPAGATORS = [(2, "rk4"), (3, "rk4"), (2, "auto"), (3, "auto"), (3, "split")]
-NAMES = ("moving", "mixed", "docks", "capture", "bounded", "orbiting", "gradient", "spinning")
+NAMES = ("moving", "mixed", "docks", "capture", "bounded", "orbiting", "gradient", "spinning", "laden")
 SCENES = [(fmi, scene) for scene in NAMES for fmi in (2, 3)]
 BUILDS = pytest.mark.parametrize(("fmi", "propagator"), [*PROPAGATORS, *SCENES])
 """FMI version, and propagator of RAW or one of CHANGING."""
@@ -152,6 +152,27 @@ CHANGING = {
             "outputs.names": [*MOVING["outputs"]["names"], "A.w.momentum", "A.w.speed"],
         },
     ),
+    "laden": variant(
+        MOVING,
+        ORBIT
+        | {
+            "docks": [*DOCKS, RIVAL],
+            "inputs": {
+                **MOVING["inputs"],
+                "motion": [],
+                "docked": ["berth", "tail", "rival"],
+                "gravity": True,
+            },
+            "vessels.C.wheels": {"w": {"axis": [1.0, 0.0, 0.0], "inertia": 9.0, "momentum": -50.0}},
+            "inputs.wheel": ["C.w"],
+            "rotation.pose_change": "rate",
+            "outputs.names": [
+                *RAW["outputs"]["names"],
+                *(f"{dock}.{load}" for dock in ("berth", "tail", "rival") for load in ("force", "moment")),
+                *(f"B.rcs.{kind}" for kind in ("position", "velocity", "acceleration", "specific_force")),
+            ],
+        },
+    ),
     "gradient": variant(RAW, ORBIT | {"rotation.propagator": "taylor", "rotation.tolerance": 1e-3}),
     "spinning": variant(
         RAW,
@@ -165,7 +186,8 @@ CHANGING = {
 }
 """Scenes with forces: a port moves and all changes keep momentum, or poses alone do; docks open and close
 beside, or two of them at one port by turns; the bound of a cheap law's error is carried along all that;
-wheels and gravity's gradient besides; and the gradient, and a wheel, without these, by Taylor series."""
+wheels and gravity's gradient besides, or loads and points too; the gradient, and a wheel, without these, by
+Taylor series."""
 
 
 @cache
