@@ -6,7 +6,7 @@ from functools import cached_property
 
 import casadi as ca
 
-from supervessel.composite.actions import net_force, vessel_outputs
+from supervessel.composite.actions import net_force, vessel_outputs, vessel_pieces
 from supervessel.composite.inertia import from_upper_triangle
 from supervessel.composite.resolved import ResolvedScene
 from supervessel.composite.shown.loads import load_outputs
@@ -110,6 +110,7 @@ EXPRESSIONS: dict[str, Callable[[Known], ca.SX]] = {
     "principal_axes": lambda known: known.parts["principal"][3:],
     "error_estimate": lambda known: known.parts["error_estimate"],
     "error_bound": lambda known: known.parts["error_bound"],
+    "barycentre_velocity": lambda known: known.parts.get("velocity", ca.SX.zeros(3)),
     "net_force": lambda known: net_force(known.resolved, known.parts, known.u),
 }
 """By name of an output of the whole, its expression; `composite` has those of vessels, wheels, points, docks.
@@ -136,7 +137,8 @@ def outputs_of(
     of_owners = {} if wheels is None else wheel_outputs(resolved, wheels, omega, stored)
     for name in resolved.vessels_shown:
         held = momentum_of_vessel(resolved.scene, wheels, name, stored)
-        of_owners |= vessel_outputs(name, parts[f".{name}"], attitude, omega, held)
+        pieces = vessel_pieces(resolved, name, parts)
+        of_owners |= vessel_outputs(name, pieces, attitude, omega, held)
     for name in resolved.points_shown:
         of_owners |= point_outputs(name, parts[f".{name}"], known.motion)
     for name in resolved.docks_shown:

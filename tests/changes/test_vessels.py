@@ -21,7 +21,8 @@ def shown(seed: int, count: int, **rotation: Any) -> dict[str, Any]:
     """Returns a random assembly with outputs of every vessel, the forces' sum and the whole momentum."""
     raw = assembly(seed, count, **rotation)
     names = [f"{vessel}.{name}" for vessel in raw["vessels"] for name in VESSEL_OUTPUTS]
-    return variant(raw, {"outputs": {"names": [*names, "net_force", "angular_momentum"]}})
+    names += ["net_force", "angular_momentum", "barycentre_velocity"]
+    return variant(raw, {"outputs": {"names": names}})
 
 
 def moved(flown: Scene, seed: int) -> Values:
@@ -66,6 +67,8 @@ def test_outputs_of_vessels_are_the_references(seed, count):
             if kind == "attitude" and value @ right < 0.0:  # at half a turn either sign is right
                 value = -value
             assert np.abs(value - right).max() <= AGREEMENT * largest, (vessel, kind)
+    drift = reference.barycentre_velocity(flown, values)
+    assert np.abs(found["barycentre_velocity"] - drift).max() <= AGREEMENT * (np.abs(drift).max() + 1.0)
     force = reference.net_force(flown, values)
     assert np.abs(found["net_force"] - force).max() <= AGREEMENT * (np.abs(force).max() + 3.0)
 

@@ -177,7 +177,15 @@ def _matrix(numbers: ca.SX, number: int) -> ca.SX:
     return ca.reshape(numbers[9 * number : 9 * number + 9], 3, 3)
 
 
-SIZES = {"docked": 1, "origin": 3, "centre": 3, "rotation": 9, "rate": 3, "inertia": 6, "spin": 3}
+SIZES: Mapping[str, int] = {
+    "docked": 1,
+    "origin": 3,
+    "centre": 3,
+    "rotation": 9,
+    "rate": 3,
+    "inertia": 6,
+    "spin": 3,
+}
 """Sizes of the elements of a vessel's part of c; all are zero while the vessel is not docked.
 
 docked   : 1 or 0
@@ -191,11 +199,23 @@ spin     : angular momentum of the vessel's motion relative to body axes, about 
            axes, its wheels' along their axes left out
 """
 
+SIZES_IN_MOTION: Mapping[str, int] = {**SIZES, "velocity": 3}
+"""The same of a vessel whose `velocity` is an output.
+
+velocity : of the vessel's centre of mass relative to the barycentre and body axes [m/s], body axes
+"""
+
+
+def sizes_of(resolved: ResolvedScene, name: str) -> Mapping[str, int]:
+    """Returns the sizes of the elements of a vessel's part of c, in their order."""
+    return SIZES_IN_MOTION if f"{name}.velocity" in resolved.scene.outputs.names else SIZES
+
 
 def vessel_parts(resolved: ResolvedScene, lookup: Lookup, whole: Body) -> dict[str, ca.SX]:
-    """Returns the part of c, (28,), of each vessel that outputs are about, by the vessel's name after a dot.
+    """Returns the part of c of each vessel that outputs are about, by the vessel's name after a dot.
 
     whole : the composite as one body
+    `sizes_of` has the layout of a part.
     """
     if not resolved.vessels_shown:
         return {}
@@ -206,9 +226,19 @@ def vessel_parts(resolved: ResolvedScene, lookup: Lookup, whole: Body) -> dict[s
         body = vessel_body(resolved.scene, name, lookup, Pose(ca.SX.eye(3), ca.SX.zeros(3)))
         origin = constant(from_anchor(resolved.scene, name, np.zeros(3)))
         seen = body.seen_from(pose.rotation, pose.origin, pose.velocity, pose.rate)
-        part = _vessel_part(_free_of_wheels(resolved.scene, name, seen, pose), pose, origin, whole)
+        pieces = _vessel_part(_free_of_wheels(resolved.scene, name, seen, pose), pose, origin, whole)
+        part = ca.vertcat(*(pieces[key] for key in sizes_of(resolved, name)))
         parts[f".{name}"] = part if attached is None else attached * part
     return parts
+
+
+def vessel_pieces(resolved: ResolvedScene, name: str, parts: Mapping[str, ca.SX]) -> dict[str, ca.SX]:
+    """Returns the elements of a vessel's part of c by name.
+
+    parts : the parts of c by name
+    """
+    part = parts[f".{name}"]
+    return {key: part[place] for key, place in slices_of(sizes_of(resolved, name)).items()}
 
 
 def _free_of_wheels(scene: Scene, name: str, seen: Body, pose: Pose) -> Body:
@@ -218,8 +248,8 @@ def _free_of_wheels(scene: Scene, name: str, seen: Body, pose: Pose) -> Body:
     return Body(body.mass, body.centre, free_inertia(body.inertia, wheels), body.velocity, body.spin)
 
 
-def _vessel_part(seen: Body, pose: Pose, origin: ca.SX, whole: Body) -> ca.SX:
-    """Returns the part of c, (28,), of a docked vessel, in the layout of SIZES.
+def _vessel_part(seen: Body, pose: Pose, origin: ca.SX, whole: Body) -> dict[str, ca.SX]:
+    """Returns the elements of the part of c of a docked vessel, by their names in SIZES_IN_MOTION.
 
     seen   : the vessel in the root's axes
     pose   : of the vessel in the root's axes, its origin the anchor
@@ -228,27 +258,34 @@ def _vessel_part(seen: Body, pose: Pose, origin: ca.SX, whole: Body) -> ca.SX:
     """
     rho = seen.centre - whole.centre
     inertia = seen.inertia + seen.mass * offset_tensor(rho)
-    spin, rate = ca.SX.zeros(3), ca.SX.zeros(3)
+    spin, rate, velocity = ca.SX.zeros(3), ca.SX.zeros(3), ca.SX.zeros(3)
     if whole.velocity is not None:
-        velocity = ca.SX.zeros(3) if seen.velocity is None else seen.velocity
-        spin = seen.mass * ca.cross(rho, velocity - whole.velocity)
+        velocity = (velocity if seen.velocity is None else seen.velocity) - whole.velocity
+        spin = seen.mass * ca.cross(rho, velocity)
         spin = spin if seen.spin is None else spin + seen.spin
         rate = rate if pose.rate is None else pose.rate
-    place, R_body_vessel = pose.origin + pose.rotation @ origin - whole.centre, ca.vec(pose.rotation)
-    return ca.vertcat(1.0, place, rho, R_body_vessel, rate, upper_triangle(inertia), spin)
+    return {
+        "docked": ca.SX(1.0),
+        "origin": pose.origin + pose.rotation @ origin - whole.centre,
+        "centre": rho,
+        "rotation": ca.vec(pose.rotation),
+        "rate": rate,
+        "inertia": upper_triangle(inertia),
+        "spin": spin,
+        "velocity": velocity,
+    }
 
 
 def vessel_outputs(
-    name: str, part: ca.SX, attitude: ca.SX, omega: ca.SX, stored: ca.SX | None
+    name: str, pieces: Mapping[str, ca.SX], attitude: ca.SX, omega: ca.SX, stored: ca.SX | None
 ) -> dict[str, ca.SX]:
     """Returns the outputs of a vessel by name; `scene.outputs` says what they are, with units and axes.
 
-    part     : the vessel's part of c, (28,), in the layout of SIZES
+    pieces   : the elements of the vessel's part of c by name, see `vessel_pieces`
     attitude : q_inertial_body, (4,), of unit length
     omega    : angular velocity of the body, (3,) [rad/s], body axes
     stored   : momentum of the vessel's wheels, (3,) [N m s], body axes; None: it has none
     """
-    pieces = {key: part[place] for key, place in slices_of(SIZES).items()}
     R_body_vessel = ca.reshape(pieces["rotation"], 3, 3)
     share = from_upper_triangle(pieces["inertia"]) @ omega + pieces["spin"]
     share = share if stored is None else share + stored
@@ -258,10 +295,14 @@ def vessel_outputs(
         is_docked = pieces["docked"] > 0.5
         R_or_identity = ca.if_else(is_docked, R_body_vessel, ca.SX.eye(3))
         q_body_vessel = ca.if_else(is_docked, quaternion(R_or_identity), 0.0)
-    return {
+    outputs = {
         f"{name}.origin": pieces["origin"],
         f"{name}.centre_of_mass": pieces["centre"],
         f"{name}.attitude": q_body_vessel,
         f"{name}.angular_velocity": R_body_vessel.T @ (omega + pieces["rate"]),
         f"{name}.angular_momentum": to_inertial(attitude, share),
     }
+    if "velocity" in pieces:
+        velocity = ca.cross(omega, pieces["centre"]) + pieces["velocity"]
+        outputs[f"{name}.velocity"] = to_inertial(attitude, velocity)
+    return outputs

@@ -90,6 +90,8 @@ def composite_parts(resolved: ResolvedScene, p: ca.SX) -> dict[str, ca.SX]:
     momentum      : (4,), where ports move: angular momentum h, (3,) [N m s], body axes, of the parts that
                     move relative to body axes; and the square, [rad2/s2], of |h| trace((J - A)^-1), which
                     bounds |(J - A)^-1 (omega x h)|/|omega|
+    velocity      : (3,) [m/s], where ports move and outputs need it: velocity of the barycentre relative to
+                    the root vessel's axes, body axes
     lightness     : (1,) [1/(kg m2)], where there are wheels: trace((J - A)^-1)
     excess        : (1,), where there are wheels, see `growth_excess`
     moving        : (1,) [J], where the output total_kinetic_energy is asked for: kinetic energy of parts that
@@ -105,6 +107,8 @@ def composite_parts(resolved: ResolvedScene, p: ca.SX) -> dict[str, ca.SX]:
     if "total_kinetic_energy" in resolved.scene.outputs.names:
         locked = ca.SX(0.0) if wheels is None else wheels.locked_energy
         parts["moving"] = energy_of_motion(resolved, lookup, body) - locked
+    if body.velocity is not None and resolved.shows_velocity:
+        parts["velocity"] = body.velocity
     parts |= action_parts(resolved, lookup, body.centre) | vessel_parts(resolved, lookup, body)
     parts |= point_parts(resolved, lookup, body) | load_parts(resolved, lookup, body.centre, wheels)
     return {name: ca.densify(part) for name, part in parts.items()}

@@ -157,6 +157,11 @@ class ResolvedScene:
         return dict.fromkeys(name for kind, name in self.output_kinds if kind.owner == owner)
 
     @cached_property
+    def shows_velocity(self) -> bool:
+        """Whether an output follows from the velocity of the barycentre relative to the root vessel."""
+        return "barycentre_velocity" in self.scene.outputs.names
+
+    @cached_property
     def groups(self) -> tuple[RigidGroup, ...]:
         """The rigid groups of vessels, the root's own first, in the order in which they hang on it.
 

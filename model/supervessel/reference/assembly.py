@@ -75,6 +75,17 @@ class Points:
         return barycentre
 
     @property
+    def drift(self) -> Array:
+        """Velocity of their barycentre, (3,) [m/s].
+
+        Example:
+            >>> reference.points(scene)["DG"].drift.tolist()
+            [0.0, 0.0, 0.0]
+        """
+        drift: Array = self.masses @ self.velocities / self.masses.sum()
+        return drift
+
+    @property
     def momentum(self) -> Array:
         """Their angular momentum about their barycentre, (3,) [N m s].
 
@@ -83,7 +94,7 @@ class Points:
             [0.0, 0.0, 0.0]
         """
         m, v = self.masses, self.velocities
-        v_rho = v - m @ v / m.sum()
+        v_rho = v - self.drift
         momentum: Array = m @ _cross(self.positions - self.barycentre, v_rho)
         return momentum
 
@@ -352,3 +363,14 @@ def internal_momentum(scene: Scene, values: Mapping[str, float] | None = None) -
         [0.0, 0.0, 0.0]
     """
     return joined(points(scene, values).values()).momentum
+
+
+def barycentre_velocity(scene: Scene, values: Mapping[str, float] | None = None) -> Array:
+    """Returns the velocity of the barycentre relative to the root vessel, (3,) [m/s], root axes, by ports
+    that move.
+
+    Example:
+        >>> reference.barycentre_velocity(scene).tolist()
+        [0.0, 0.0, 0.0]
+    """
+    return joined(points(scene, values).values()).drift

@@ -229,6 +229,7 @@ def vessel_outputs(
             f"{vessel}.attitude": quaternion(motion.rotation),
             f"{vessel}.angular_velocity": motion.rotation.T @ (omega + motion.rate),
             f"{vessel}.angular_momentum": R_inertial_body @ momentum,
+            f"{vessel}.velocity": R_inertial_body @ (part.masses @ v / part.masses.sum()),
         }
     return outputs
 

@@ -154,6 +154,11 @@ OUTPUTS: dict[str, OutputKind] = {
             of_step=True,
         ),
         OutputKind("net_force", "N", "sum of the forces, body axes"),
+        OutputKind(
+            "barycentre_velocity",
+            "m/s",
+            "velocity of the barycentre relative to the root vessel's origin and axes, by ports that move",
+        ),
     )
 }
 """Outputs of the whole, by name."""
@@ -188,6 +193,12 @@ VESSEL_OUTPUTS: dict[str, OutputKind] = {
             "share of {owner} in the angular momentum about the barycentre, inertial axes",
             owner="vessel",
             nominal=lambda whole: whole.moment * whole.rate,
+        ),
+        OutputKind(
+            "velocity",
+            "m/s",
+            "velocity of the centre of mass of {vessel} relative to the barycentre, inertial axes",
+            of_vessel=True,
         ),
     )
 }
