@@ -10,6 +10,7 @@
 #include "docks.h"
 #include "error_bound.h"
 #include "exchange_state.h"
+#include "hand_over.h"
 #include "kept_in_changes.h"
 
 static void copy_p(double to[], const double from[]) {
@@ -28,8 +29,10 @@ static Status refuse_rate(Instance *instance, const double p[], const double rat
 static Status rate_after(Instance *instance, const double p[], const double c[], double rate[RATE_COUNT]) {
     const Dynamics *now = &instance->now;
     memcpy(rate, now->kept_rate, sizeof now->kept_rate);
+    hand_over_hold(instance);
     if (memcmp(p, now->stepped_p, INPUT_P_COUNT * sizeof(double)) == 0) return STATUS_OK;
-    const Status status = rate_on_the_way(instance, p, c, rate);
+    Status status = rate_on_the_way(instance, p, c, rate);
+    if (status == STATUS_OK) status = hand_over_change(instance, p, c, rate);
     if (status != STATUS_OK) return status;
     docks_join(instance, p, c, rate);
     const bool finite = isfinite(rate[0]) && isfinite(rate[1]) && isfinite(rate[2]);

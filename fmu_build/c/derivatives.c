@@ -9,6 +9,7 @@
 
 #include "changes.h"
 #include "field.h"
+#include "hand_over.h"
 #include "model.h"
 #include "motors.h"
 #include "variables.h"
@@ -154,6 +155,7 @@ static Status forward(Instance *instance, const unsigned unknowns[], size_t unkn
     if (shape_changes) status = changes_forward(instance, v);
     if (status != STATUS_OK) return status;
     respond(instance, true);
+    if (HANDED_COUNT && shape_changes) status = hand_over_forward(instance, v);
     for (size_t i = 0; i < unknown_count; i++) sensitivity[i] = *place(v, unknowns[i]);
     return status;
 }
@@ -169,6 +171,12 @@ Status derivatives_forward(Instance *instance, const unsigned unknowns[], size_t
     status = forward(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity);
     if (!ordinary) fesetenv(&importers);
     return status == STATUS_OK ? check_results(instance, unknowns, unknown_count, sensitivity) : status;
+}
+
+/* Adds to the weights on the inputs those of the states, and of what is handed over, that follow from a change of them. */
+static Status weigh_changes(Instance *instance, Variation *v) {
+    const Status status = changes_reverse(instance, v);
+    return HANDED_COUNT && status == STATUS_OK ? hand_over_reverse(instance, v) : status;
 }
 
 static Status adjoint(Instance *instance, const unsigned unknowns[], size_t unknown_count, const unsigned knowns[],
@@ -194,7 +202,7 @@ static Status adjoint(Instance *instance, const unsigned unknowns[], size_t unkn
     instance->arg[1] = v->c;
     instance->res[0] = v->inputs;
     composite_reverse(instance->arg, instance->res, instance->iw, instance->w, 0);
-    const Status status = changes_reverse(instance, v);
+    const Status status = weigh_changes(instance, v);
     if (status != STATUS_OK) return status;
     composite_scale_variation(instance, v->inputs);
     for (size_t i = 0; i < known_count; i++) {

@@ -18,10 +18,15 @@ static void leave_closing(const Instance *instance, const double p[], double mot
             memset(&motion[DOCKS[i].motion], 0, 6 * sizeof(double));
 }
 
-/* The motion at contact of the docks that close, and the momentum that it brings. */
-static void motion_at_contact(Instance *instance, const double p[], double motion[], double momentum[3]) {
+/* The motion at contact of the docks that close. */
+static void read_motion(const Instance *instance, const double p[], double motion[]) {
     memcpy(motion, &instance->now.values[REFERENCE_CONTACT], INPUT_K_COUNT * sizeof(double));
     leave_closing(instance, p, motion);
+}
+
+/* The same, and the momentum that it brings. */
+static void motion_at_contact(Instance *instance, const double p[], double motion[], double momentum[3]) {
+    read_motion(instance, p, motion);
     instance->arg[0] = p;
     instance->arg[1] = motion;
     instance->res[0] = momentum;
@@ -81,6 +86,45 @@ void docks_join_reverse(Instance *instance, const double rate[RATE_COUNT], doubl
     for (size_t i = 0; i < COMPOSITE_COUNT; i++) on_composite[i] += wc[i];
     memcpy(weight, on_rate, 3 * sizeof(double));
 }
+
+#if HANDED_COUNT
+
+void docks_contact_velocity(Instance *instance, const double p[], double velocity[3]) {
+    double motion[INPUT_K_COUNT];
+    read_motion(instance, p, motion);
+    instance->arg[0] = p;
+    instance->arg[1] = motion;
+    instance->res[0] = velocity;
+    contact_velocity(instance->arg, instance->res, instance->iw, instance->w, 0);
+}
+
+void docks_contact_velocity_forward(Instance *instance, const Variation *v, double velocity[3]) {
+    const double *p = instance->now.p;
+    double motion[INPUT_K_COUNT], small_motion[INPUT_K_COUNT];
+    read_motion(instance, p, motion);
+    memcpy(small_motion, v->inputs + INPUT_P_COUNT, sizeof small_motion);
+    leave_closing(instance, p, small_motion);
+    const double *const arguments[] = {p, motion, v->inputs, small_motion};
+    memcpy(instance->arg, arguments, sizeof arguments);
+    instance->res[0] = velocity;
+    contact_velocity_forward(instance->arg, instance->res, instance->iw, instance->w, 0);
+}
+
+void docks_contact_velocity_reverse(Instance *instance, const double weight[3], Variation *v) {
+    const double *p = instance->now.p;
+    double motion[INPUT_K_COUNT], on_p[INPUT_P_COUNT], on_motion[INPUT_K_COUNT];
+    read_motion(instance, p, motion);
+    const double *const arguments[] = {p, motion, weight};
+    double *const weights[] = {on_p, on_motion};
+    memcpy(instance->arg, arguments, sizeof arguments);
+    memcpy(instance->res, weights, sizeof weights);
+    contact_velocity_reverse(instance->arg, instance->res, instance->iw, instance->w, 0);
+    leave_closing(instance, p, on_motion);
+    for (size_t i = 0; i < INPUT_P_COUNT; i++) v->inputs[i] += on_p[i];
+    for (size_t i = 0; i < INPUT_K_COUNT; i++) v->inputs[INPUT_P_COUNT + i] += on_motion[i];
+}
+
+#endif
 
 const char *docks_first_closing(const Instance *instance, const double p[]) {
     for (size_t i = 0; i < DOCK_COUNT; i++)

@@ -3,6 +3,8 @@
 #ifndef DOCKS_H
 #define DOCKS_H
 
+#include <string.h>
+
 #include "changes.h"
 #include "variables.h"
 
@@ -36,6 +38,14 @@ void docks_join_forward(Instance *instance, const Variation *v, const double rat
 void docks_join_reverse(Instance *instance, const double rate[RATE_COUNT], double weight[RATE_COUNT],
                         double on_composite[], Variation *v);
 
+#if HANDED_COUNT
+/* The velocity of the barycentre relative to the root vessel [m/s] that the docks that close bring along. Forward: its
+   small change by the motion at contact and all else in v->inputs. Reverse: adds to the weights on these. */
+void docks_contact_velocity(Instance *instance, const double p[], double velocity[3]);
+void docks_contact_velocity_forward(Instance *instance, const Variation *v, double velocity[3]);
+void docks_contact_velocity_reverse(Instance *instance, const double weight[3], Variation *v);
+#endif
+
 /* The name of the input of the first dock that closes, or NULL. */
 const char *docks_first_closing(const Instance *instance, const double p[]);
 
@@ -58,6 +68,20 @@ static inline void docks_join_forward(Instance *instance, const Variation *v, co
 static inline void docks_join_reverse(Instance *instance, const double rate[RATE_COUNT], double weight[RATE_COUNT],
                                       double on_composite[], Variation *v) {
     (void)instance, (void)rate, (void)weight, (void)on_composite, (void)v;
+}
+
+static inline void docks_contact_velocity(Instance *instance, const double p[], double velocity[3]) {
+    (void)instance, (void)p;
+    memset(velocity, 0, 3 * sizeof *velocity);
+}
+
+static inline void docks_contact_velocity_forward(Instance *instance, const Variation *v, double velocity[3]) {
+    (void)instance, (void)v;
+    memset(velocity, 0, 3 * sizeof *velocity);
+}
+
+static inline void docks_contact_velocity_reverse(Instance *instance, const double weight[3], Variation *v) {
+    (void)instance, (void)weight, (void)v;
 }
 
 static inline const char *docks_first_closing(const Instance *instance, const double p[]) {

@@ -107,6 +107,14 @@ enum { RATE_COUNT = STATE_COUNT - 4 };
 /* Places in errors. */
 enum { ESTIMATE, BOUND };
 
+#if HANDED_COUNT
+/* What an instant of change hands over, see hand_over.h: jumps [m, m/s], then outputs of vessels that leave. */
+typedef struct {
+    double values[HANDED_COUNT];
+    double time; /* s: of the instant */
+} Handed;
+#endif
+
 /* All that a saved state holds. The doubles come first: there is no padding but at the end, and that stays zero. Arrays
    that a scene does not need have one element, which stays zero too. */
 typedef struct {
@@ -128,6 +136,9 @@ typedef struct {
     double c[COMPOSITE_COUNT];        /* the composite of p */
     double a[AXES_COUNT + 1];         /* moments, axes and the like of c */
     double stepped_p[INPUT_P_COUNT + 1]; /* p of the last communication step or event, at first of the start */
+#if HANDED_COUNT
+    struct { Handed latest, committed; } handed; /* with the inputs as they are; as changes were committed last */
+#endif
     double epoch[STATE_COUNT];        /* the state that free motion is counted from */
     double elapsed, elapsed_rest;     /* s since then, as an unevaluated sum */
     double from_epoch[FREE_START];    /* what free_at needs of the epoch, if epoch_step is EPOCH_SERVED */

@@ -50,6 +50,14 @@ int docked_rate(const double **arg, double **res, int *iw, double *w, int mem); 
 int docked_rate_forward(const double **arg, double **res, int *iw, double *w, int mem);
 int docked_rate_reverse(const double **arg, double **res, int *iw, double *w, int mem);
 
+/* Of these a scene has those that its outputs need, see hand_over.h: x, omega, c, c, c, c, velocity -> what is added */
+int handed_over(const double **arg, double **res, int *iw, double *w, int mem);
+int handed_over_forward(const double **arg, double **res, int *iw, double *w, int mem);
+int handed_over_reverse(const double **arg, double **res, int *iw, double *w, int mem);
+int contact_velocity(const double **arg, double **res, int *iw, double *w, int mem);  /* p, k -> m/s */
+int contact_velocity_forward(const double **arg, double **res, int *iw, double *w, int mem);
+int contact_velocity_reverse(const double **arg, double **res, int *iw, double *w, int mem);
+
 /* Of these a scene has those that its propagator uses. */
 int fastest_square(const double **arg, double **res, int *iw, double *w, int mem);    /* x, u, c -> rad2/s2 */
 int step(const double **arg, double **res, int *iw, double *w, int mem);              /* x, u, c, h -> x, error */

@@ -10,6 +10,7 @@
 
 #include "changes.h"
 #include "field.h"
+#include "hand_over.h"
 #include "model.h"
 #include "motors.h"
 
@@ -64,6 +65,7 @@ static Status refresh_outputs(Instance *instance) {
     instance_set_arguments(instance);
     instance->res[0] = &instance->now.values[REFERENCE_OUTPUTS];
     instance_call(instance, outputs, instance_is_ordinary(instance));
+    hand_over_show(instance);
     instance->outputs_are_current = true;
     return STATUS_OK;
 }
@@ -220,6 +222,7 @@ Status instance_set(Instance *instance, const unsigned references[], size_t coun
 Status instance_set_time(Instance *instance, double time) {
     if (!isfinite(time)) return instance_refuse(instance, "time = %.10g s: must be finite", time);
     instance->now.values[REFERENCE_TIME] = time;
+    if (HANDED_COUNT) instance->outputs_are_current = false;
     return STATUS_OK;
 }
 

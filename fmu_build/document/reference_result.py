@@ -87,7 +87,7 @@ def manifest(files: Collection[str]) -> dict[str, bytes]:
 
 def shown_outputs(entries: Sequence[TableEntry]) -> list[TableEntry]:
     """Returns the outputs that a reference result has: all but those that tell of a step's error."""
-    return [e for e in entries if isinstance(e.variable, OutputVariable) and not e.variable.kind.of_step]
+    return [e for e in entries if isinstance(e.variable, OutputVariable) and not e.variable.kind.of_history]
 
 
 def inputs_table(flight: ReferenceFlight, entries: Sequence[TableEntry], *, quoted: bool = False) -> bytes:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from fmu_build.generate.change_tables import change_tables
 from fmu_build.generate.equations_source import model_source
 from fmu_build.generate.lane_steps import loop_steps
-from fmu_build.generate.picked_files import picked_files
+from fmu_build.generate.picked_files import goes_by_changes, picked_files
 from fmu_build.generate.scene_header import scene_header
 from fmu_build.generate.scene_source import scene_source
 from fmu_build.generate.sources import digest, layer_files_of, source_file_names, source_files
@@ -36,7 +36,7 @@ def generate(scene: Scene, fmi: int, model: Equations | None = None) -> tuple[di
 
 def generated(model: Equations, entries: Sequence[TableEntry], fmi: int) -> tuple[dict[str, str], bytes]:
     """Returns the same as `generate`, from a scene's equations and variable table."""
-    scene, changing = model.resolved.scene, model.change is not None
+    scene, changing = model.resolved.scene, goes_by_changes(model)
     loop = loop_tables(model)
     functions = model.functions if loop is None else loop_functions(model)
     tables = change_tables(model) + wheel_tables(model) + loop_source(loop)

@@ -25,15 +25,18 @@ CHANGES = frozenset(
 )
 BOUND = frozenset({"error_bound"})
 STAGES = frozenset({"stages"})
+HAND_OVER = frozenset({"hand_over"})
 MOTORS = frozenset({"motors"})
 FIELD = frozenset({"field"})
 FIELD_SERIES = frozenset({"gradient_series"})
 STEPS = frozenset(WHEN_FREE.values()).union(*(method.c_files for method in PROPAGATORS.values()))
 
-PICKED = LOOP | BOOLEANS | CHANGES | BOUND | STAGES | MOTORS | FIELD | FIELD_SERIES | STEPS
+PICKED = LOOP | BOOLEANS | CHANGES | BOUND | STAGES | HAND_OVER | MOTORS | FIELD | FIELD_SERIES | STEPS
 """Names, without .c and .h, of the files that are not in every FMU, HEADERS excepted."""
 
-HEADERS = frozenset({"changes.h", "error_bound.h", "docks.h", "booleans.h", "motors.h", "field.h"})
+HEADERS = frozenset(
+    {"changes.h", "error_bound.h", "docks.h", "booleans.h", "motors.h", "field.h", "hand_over.h"}
+)
 """Headers with such names that are in every FMU, because other files include them."""
 
 
@@ -57,14 +60,23 @@ def picked_files(model: Equations, has_loop: bool) -> frozenset[str]:
         | bound
         | stages
         | _for_field(model)
+        | (HAND_OVER if model.hand_over is not None else frozenset())
         | (MOTORS if "MOTOR_COUNT" in wheel_constants(model) else frozenset())
         | (LOOP if has_loop else frozenset())
     )
 
 
+def goes_by_changes(model: Equations) -> bool:
+    """Whether the FMU has changes.c: a change can change the angular velocity, or hands something over."""
+    return model.change is not None or model.hand_over is not None
+
+
 def has_stages(model: Equations) -> bool:
-    """Whether a change of inputs goes stage by stage, since something keeps the momentum over one."""
+    """Whether a change of inputs goes stage by stage, since something keeps the momentum over one or the
+    barycentre jumps at some of them."""
     scene = model.resolved.scene
+    if model.hand_over is not None:
+        return True
     keeps = keeps_in_truth(scene) if model.bound else {} if model.change is None else scene.keeps
     return "momentum" in keeps.values()
 
@@ -79,7 +91,7 @@ def _for_field(model: Equations) -> frozenset[str]:
 def _for_changes(model: Equations) -> frozenset[str]:
     """Returns the files of CHANGES that a scene needs, see changes.h."""
     scene = model.resolved.scene
-    if model.change is None:
+    if not goes_by_changes(model):
         return frozenset({"no_changes"})
     found = {"changes", "exchange_state", "kept_in_changes"}
     keeps_some, by_momentum = "momentum" in scene.keeps.values(), keeps_momentum(scene)

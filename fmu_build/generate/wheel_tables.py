@@ -1,6 +1,5 @@
 """C macros about wheels, and a table of motors that must rest while docks let go of the wheels' vessels."""
 
-from supervessel.composite.wheels import may_leave
 from supervessel.equations import Equations
 from supervessel.scene.inputs import vessel_of
 
@@ -35,7 +34,7 @@ def _rows(model: Equations) -> list[str]:
     resolved = model.resolved
     rows = []
     for number, name in enumerate(resolved.scene.wheels):
-        if name in resolved.scene.inputs.wheel and may_leave(resolved, vessel_of(name)):
+        if name in resolved.scene.inputs.wheel and resolved.may_leave(vessel_of(name)):
             axis = model.slices.composite["wheels"].start + 3 * number
             rows.append(f"{{{model.names.u.index(f'{name}.torque')}, {axis}}}")
     return rows

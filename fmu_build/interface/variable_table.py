@@ -153,7 +153,7 @@ def _dependencies(model: Equations, knowns: Sequence[int], booleans: Set[int]) -
     follows = _after_change(model, z, (p, k), c)
     now = rows(
         {
-            "output": model.exchange.outputs(follows, u, c, a, 0.0),
+            "output": model.exchange.outputs(follows, u, c, a, 0.0) + _handed_over(model, z, (p, k), c),
             "derivative": model.exchange.ode(follows, u, c),
         }
     )
@@ -188,6 +188,25 @@ def _after_change(model: Equations, z: ca.SX, inputs: tuple[ca.SX, ca.SX], c: ca
         shaping = zip(model.resolved.shaping, ca.vertsplit(p), strict=True)
         jump += sum((flag for variable, flag in shaping if variable.boolean), ca.SX(0))
     return ca.vertcat(z[:4], z[4:7] + ca.SX.sym("scale") * jump, z[7:])
+
+
+def _handed_over(model: Equations, z: ca.SX, inputs: tuple[ca.SX, ca.SX], c: ca.SX) -> ca.SX:
+    """Returns an expression, as y, whose structure shows what a change of inputs hands over depends on.
+
+    inputs : p and k
+    """
+    handed, added, (p, k) = model.hand_over, ca.SX(len(model.names.y), 1), inputs
+    if handed is None:
+        return added
+    before, scale = ca.SX.sym("before", c.numel()), ca.SX.sym("scale", len(model.names.z))
+    x = scale * z
+    velocity = ca.SX.zeros(3) if handed.contact_velocity is None else handed.contact_velocity(p, k)
+    found = handed.handed_over(x, x[4:], before, c, c, c, velocity)
+    for group, place in handed.slices.items():
+        if group in model.resolved.scene.outputs.names:
+            first = model.names.y.index(f"{group}[1]")
+            added[first : first + place.stop - place.start] = scale[0] * found[place]
+    return added
 
 
 def _rows(

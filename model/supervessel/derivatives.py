@@ -4,7 +4,7 @@ Forward derivatives take a small change (seed) of each argument to the change of
 derivatives take a weight of each result to the weight of each argument, J^T w; J is the Jacobian matrix.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -52,6 +52,17 @@ def derivatives(
         ca.Function(f"{name}_forward", known + seeds, split(forward, results)),
         ca.Function(f"{name}_reverse", known + weights, split(reverse, arguments)),
     )
+
+
+def named_function(name: str, arguments: Mapping[str, ca.SX], result: ca.SX) -> ca.Function:
+    """Returns a function of arguments with names, and of one result, dense."""
+    return ca.Function(name, list(arguments.values()), [ca.densify(result)], list(arguments), ["result"])
+
+
+def derivatives_of(function: ca.Function) -> tuple[ca.Function, ca.Function]:
+    """Returns the derivatives of a function of one result, see `derivatives`."""
+    arguments = [ca.SX.sym(f"v{i}", function.numel_in(i)) for i in range(function.n_in())]
+    return derivatives(function.name(), arguments, [function(*arguments)])
 
 
 def _forward_through(given: GivenDerivative, changed: ca.SX, seed: ca.SX) -> ca.SX:

@@ -37,13 +37,14 @@ from supervessel.composite.parts import (
 )
 from supervessel.composite.resolved import ResolvedScene, resolve
 from supervessel.composite.start import composite_at_start, p_start
-from supervessel.derivatives import GivenDerivative, derivatives
+from supervessel.derivatives import GivenDerivative, derivatives, derivatives_of
 from supervessel.output_expressions import outputs_of
 from supervessel.rotation.axes import axes_derivative, axes_graph
 from supervessel.rotation.changes import Change, change_functions
 from supervessel.rotation.dynamics import dynamics_of
 from supervessel.rotation.error_bound.functions import bound_functions
 from supervessel.rotation.exchange import ExchangeStates, states_by_momentum, states_by_rate
+from supervessel.rotation.hand_over import HandOver, hand_over
 from supervessel.rotation.propagators import Plan, plan_of
 from supervessel.rotation.steps import StepFunctions, map_of_products, step_functions
 from supervessel.scene.schema import Scene, changes_rate, keeps_momentum
@@ -115,7 +116,8 @@ class Equations:
     bound           : functions by which the FMU carries its error_bound, see `rotation.error_bound.functions`
     exchange        : functions of model exchange
     change          : how the angular velocity changes with the inputs; None where it never does
-    changing        : the functions of `change` that the FMU needs, with derivatives
+    changing        : the functions of a change that the FMU needs, with derivatives
+    hand_over       : what a change hands over to the orbit's owner; None where it is nothing
     has_field       : whether gravity's gradient turns the body
     """
 
@@ -134,6 +136,7 @@ class Equations:
     exchange: ExchangeFunctions
     change: Change | None
     changing: tuple[ca.Function, ...]
+    hand_over: HandOver | None
     has_field: bool
 
     @cached_property
@@ -159,7 +162,8 @@ class Equations:
 
     @property
     def _responses(self) -> tuple[ca.Function, ...]:
-        return (self.exchange.forward, self.exchange.reverse, *self.changing)
+        handing = () if self.hand_over is None else self.hand_over.functions
+        return (self.exchange.forward, self.exchange.reverse, *self.changing, *handing)
 
 
 @interrupt_afterwards()
@@ -180,7 +184,9 @@ def equations(scene: Scene) -> Equations:
     products = map_of_products(dynamics)
     axes = axes_graph(resolved, plan, dynamics, products)
     a, e = ca.SX.sym("a", axes.a.numel()), ca.SX.sym("e", 2)
-    change = change_functions(resolved, c, graph.parts, graph.p, k) if changes_rate(scene) else None
+    handed = hand_over(resolved, graph.parts, c, (graph.p, k))
+    inner = change_functions(resolved, c, graph.parts, graph.p, k) if changes_rate(scene) or handed else None
+    change = inner if changes_rate(scene) else None
     if change is not None and keeps_momentum(scene):
         states = states_by_momentum(change, c, dynamics)
     else:
@@ -207,7 +213,8 @@ def equations(scene: Scene) -> Equations:
         bound=bound_functions(resolved, plan, graph, axes, (x, u, c)),
         exchange=_exchange_functions(states, outputs_from(states.x), (u, c, a, e), axes_change),
         change=change,
-        changing=_changing(scene, change),
+        changing=_changing(scene, inner),
+        hand_over=handed,
         has_field=dynamics.field is not None,
     )
 
@@ -258,10 +265,4 @@ def _changing(scene: Scene, change: Change | None) -> tuple[ca.Function, ...]:
         (differentiated if docked or not by_momentum else plain).append(change.keep_momentum)
     if docked:
         differentiated += [change.contact_momentum, change.docked_rate]
-    return (*plain, *differentiated, *(found for f in differentiated for found in _derivatives_of(f)))
-
-
-def _derivatives_of(function: ca.Function) -> tuple[ca.Function, ca.Function]:
-    """Returns the derivatives of a function of one result, see `derivatives`."""
-    arguments = [ca.SX.sym(f"v{i}", function.numel_in(i)) for i in range(function.n_in())]
-    return derivatives(function.name(), arguments, [function(*arguments)])
+    return (*plain, *differentiated, *(found for f in differentiated for found in derivatives_of(f)))

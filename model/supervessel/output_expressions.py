@@ -111,11 +111,14 @@ EXPRESSIONS: dict[str, Callable[[Known], ca.SX]] = {
     "error_estimate": lambda known: known.parts["error_estimate"],
     "error_bound": lambda known: known.parts["error_bound"],
     "barycentre_velocity": lambda known: known.parts.get("velocity", ca.SX.zeros(3)),
+    "barycentre_jump": lambda known: ca.SX.zeros(3),
+    "barycentre_velocity_jump": lambda known: ca.SX.zeros(3),
     "net_force": lambda known: net_force(known.resolved, known.parts, known.u),
 }
 """By name of an output of the whole, its expression; `composite` has those of vessels, wheels, points, docks.
 
-`scene.outputs` says units and axes.
+`scene.outputs` says units and axes. To jumps, and to outputs of vessels that leave, the FMU adds what
+`rotation.hand_over` gives.
 """
 
 

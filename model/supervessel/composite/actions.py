@@ -205,9 +205,14 @@ SIZES_IN_MOTION: Mapping[str, int] = {**SIZES, "velocity": 3}
 velocity : of the vessel's centre of mass relative to the barycentre and body axes [m/s], body axes
 """
 
+SIZES_LEAVING: Mapping[str, int] = {**SIZES_IN_MOTION, "mass": 1}
+"""The same of a vessel that may leave, see `ResolvedScene.leaving`; mass : of the vessel [kg]."""
+
 
 def sizes_of(resolved: ResolvedScene, name: str) -> Mapping[str, int]:
     """Returns the sizes of the elements of a vessel's part of c, in their order."""
+    if name in resolved.leaving:
+        return SIZES_LEAVING
     return SIZES_IN_MOTION if f"{name}.velocity" in resolved.scene.outputs.names else SIZES
 
 
@@ -249,7 +254,7 @@ def _free_of_wheels(scene: Scene, name: str, seen: Body, pose: Pose) -> Body:
 
 
 def _vessel_part(seen: Body, pose: Pose, origin: ca.SX, whole: Body) -> dict[str, ca.SX]:
-    """Returns the elements of the part of c of a docked vessel, by their names in SIZES_IN_MOTION.
+    """Returns the elements of the part of c of a docked vessel, by their names in SIZES_LEAVING.
 
     seen   : the vessel in the root's axes
     pose   : of the vessel in the root's axes, its origin the anchor
@@ -273,6 +278,7 @@ def _vessel_part(seen: Body, pose: Pose, origin: ca.SX, whole: Body) -> dict[str
         "inertia": upper_triangle(inertia),
         "spin": spin,
         "velocity": velocity,
+        "mass": seen.mass,
     }
 
 

@@ -156,10 +156,29 @@ class ResolvedScene:
         """Returns the names of the owners of that kind that have outputs, each once."""
         return dict.fromkeys(name for kind, name in self.output_kinds if kind.owner == owner)
 
+    def may_leave(self, vessel: str) -> bool:
+        """Whether docks that open can take a vessel off the root."""
+        return all(way.docks for way in self.home[vessel].ways)
+
+    @cached_property
+    def leaving(self) -> tuple[str, ...]:
+        """The vessels with outputs that docks can take off the root, in the scene's order."""
+        return tuple(name for name in self.vessels_shown if self.may_leave(name))
+
+    @cached_property
+    def hands_over(self) -> bool:
+        """Whether outputs show jumps of the barycentre, and any change makes one, or a vessel that leaves.
+
+        Vessels that dock or undock make jumps, and masses that change where that keeps the angular velocity.
+        """
+        shows = any(kind.jump for kind, _ in self.output_kinds)
+        jumps = bool(self.scene.inputs.docked) or self.scene.keeps.get("mass") == "rate"
+        return bool(self.leaving) or (shows and jumps)
+
     @cached_property
     def shows_velocity(self) -> bool:
         """Whether an output follows from the velocity of the barycentre relative to the root vessel."""
-        return "barycentre_velocity" in self.scene.outputs.names
+        return self.hands_over or "barycentre_velocity" in self.scene.outputs.names
 
     @cached_property
     def groups(self) -> tuple[RigidGroup, ...]:

@@ -124,11 +124,6 @@ def unit_axis(scene: Scene, name: str) -> ca.SX:
     return axis / ca.norm_2(axis)
 
 
-def may_leave(resolved: ResolvedScene, vessel: str) -> bool:
-    """Whether docks that open can take a vessel off the root."""
-    return all(way.docks for way in resolved.home[vessel].ways)
-
-
 def without_locked(body: Body, wheels: WheelAxes | None) -> Body:
     """Returns a body with the momentum of what moves in it less A k: a wheel does not turn with its
     vessel."""
@@ -155,7 +150,7 @@ def stored_rate(resolved: ResolvedScene, wheels: WheelAxes, motors: ca.SX) -> ca
     rates = []
     for w, name in enumerate(resolved.scene.wheels):
         is_held = ca.sumsqr(wheels.axes[:, w]) > 0.5
-        leaves = may_leave(resolved, vessel_of(name))
+        leaves = resolved.may_leave(vessel_of(name))
         rates.append(ca.if_else(is_held, motors[w], 0.0) if leaves else motors[w])
     return ca.vertcat(*rates)
 
@@ -176,7 +171,7 @@ def wheel_outputs(
         if inertia == 0.0:
             continue
         turned = ca.dot(axis, omega) if wheels.rates is None else ca.dot(axis, omega) + wheels.rates[w]
-        speed, leaves = stored[w] / inertia - turned, may_leave(resolved, vessel_of(name))
+        speed, leaves = stored[w] / inertia - turned, resolved.may_leave(vessel_of(name))
         found[f"{name}.speed"] = ca.if_else(ca.sumsqr(axis) > 0.5, speed, 0.0) if leaves else speed
     return found
 
@@ -190,7 +185,7 @@ def wheel_energy(resolved: ResolvedScene, wheels: WheelAxes, stored: ca.SX) -> c
     for w, name in enumerate(resolved.scene.wheels):
         if wheels.inertias[w] > 0.0:
             own = stored[w] ** 2 / (2.0 * wheels.inertias[w])
-            leaves = may_leave(resolved, vessel_of(name))
+            leaves = resolved.may_leave(vessel_of(name))
             energy += ca.if_else(ca.sumsqr(wheels.axes[:, w]) > 0.5, own, 0.0) if leaves else own
     return energy
 

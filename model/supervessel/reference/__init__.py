@@ -23,8 +23,9 @@ from supervessel.reference.assembly import (
     sample_points,
 )
 from supervessel.reference.attitude import attitude_dot, quaternion, rotation_matrix
-from supervessel.reference.changes import at_contact, change
+from supervessel.reference.changes import at_contact, before_arrivals, change, stages
 from supervessel.reference.gravity import gravity_torque, orbit_dot
+from supervessel.reference.hand_over import barycentre_jumps, leaving_vessels
 from supervessel.reference.laws import angular_acceleration, law_tensor
 from supervessel.reference.loads import loads, point_outputs
 from supervessel.reference.rotation import (
@@ -39,6 +40,7 @@ from supervessel.reference.rotation import (
     total_kinetic_energy,
     turning_tensor,
     vessel_outputs,
+    vessel_outputs_after,
 )
 from supervessel.reference.wheels import Wheels, wheel_outputs, wheels_of
 
@@ -52,7 +54,9 @@ __all__ = [
     "angular_velocity",
     "at_contact",
     "attitude_dot",
+    "barycentre_jumps",
     "barycentre_velocity",
+    "before_arrivals",
     "change",
     "closed_docks",
     "composite",
@@ -63,6 +67,7 @@ __all__ = [
     "internal_momentum",
     "joined",
     "law_tensor",
+    "leaving_vessels",
     "loads",
     "momentum_ode",
     "motions",
@@ -76,9 +81,11 @@ __all__ = [
     "quaternion",
     "rotation_matrix",
     "sample_points",
+    "stages",
     "total_kinetic_energy",
     "turning_tensor",
     "vessel_outputs",
+    "vessel_outputs_after",
     "wheel_outputs",
     "wheels_of",
 ]

@@ -28,17 +28,41 @@ def change(scene: Scene, rates: ArrayLike, before: Mapping[str, float], after: M
         >>> bool(rate[1] < 0.0011)  # the ship is farther out: the same momentum, a lower rate
         True
     """
-    rates = np.array(rates, dtype=float)
     if scene.rotation.law == "none":
-        return rates
+        return np.array(rates, dtype=float)
+    moved = stages(scene, before, after)[-1]
+    return _arrived(scene, before_arrivals(scene, rates, before, after), moved, after)
+
+
+Values = Mapping[str, float]
+
+
+def stages(scene: Scene, before: Values, after: Values) -> tuple[Values, Values, Values]:
+    """Returns the inputs after vessels have left; after masses have changed too; after poses have as well.
+
+    Example:
+        >>> left, filled, moved = reference.stages(scene, {}, {"DG.mass": 12000.0})
+        >>> left, filled
+        ({}, {'DG.mass': 12000.0})
+    """
     left = {**before, **_docked_in_both(scene, before, after)}
     filled = {name: x for name, x in left.items() if _kind(name) not in MASS_INPUTS}
     filled |= {name: x for name, x in after.items() if _kind(name) in MASS_INPUTS}
     moved = {name: x for name, x in left.items() if _kind(name) == "docked"}
     moved |= {name: x for name, x in after.items() if _kind(name) != "docked"}
-    rates = _changed(scene, "mass", rates, left, filled)
-    rates = _changed(scene, "pose", rates, filled, moved)
-    return _arrived(scene, rates, moved, after)
+    return left, filled, moved
+
+
+def before_arrivals(scene: Scene, rates: ArrayLike, before: Values, after: Values) -> Array:
+    """Returns the rates, as `change` does, before vessels arrive.
+
+    Example:
+        >>> reference.before_arrivals(scene, [0.0, 0.0011, 0.0], {}, {"DG.mass": 12000.0}).tolist()
+        [0.0, 0.0011, 0.0]
+    """
+    left, filled, moved = stages(scene, before, after)
+    rates = _changed(scene, "mass", np.array(rates, dtype=float), left, filled)
+    return _changed(scene, "pose", rates, filled, moved)
 
 
 def _kind(name: str) -> str:

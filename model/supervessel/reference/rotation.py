@@ -208,24 +208,40 @@ def vessel_outputs(
         >>> outputs["DG.origin"].round(2).tolist()
         [0.09, -26.55, 3.14]
     """
+    return vessel_outputs_after(scene, state, values, (np.zeros(3), np.zeros(3)))
+
+
+def vessel_outputs_after(
+    scene: Scene, state: ArrayLike, values: Mapping[str, float] | None, jumps: tuple[Array, Array]
+) -> dict[str, Array]:
+    """Returns the outputs of each vessel about a barycentre that has jumped since, see `vessel_outputs`.
+
+    jumps : of its place (3,) [m] and its velocity (3,) [m/s], body axes
+
+    Example:
+        >>> jumps = np.array([0.0, 1.0, 0.0]), np.zeros(3)
+        >>> outputs = reference.vessel_outputs_after(scene, [1, 0, 0, 0, 0, 0.0011, 0], None, jumps)
+        >>> outputs["DG.origin"].round(2).tolist()
+        [0.09, -27.55, 3.14]
+    """
     state = np.asarray(state, dtype=float)
     omega, R_inertial_body = state[4:7], rotation_matrix(state[:4])
     own_wheels = wheels_of(scene, state[7:], values)
     found, own = motions(scene, values), points(scene, values)
     whole = joined(own.values())
-    drift = whole.masses @ whole.velocities / whole.masses.sum()
+    barycentre, drift = whole.barycentre + jumps[0], whole.drift - np.cross(omega, jumps[0]) + jumps[1]
     outputs: dict[str, Array] = {}
     for vessel, table in scene.vessels.items():
         outputs |= {f"{vessel}.{name}": np.zeros(4 if name == "attitude" else 3) for name in VESSEL_OUTPUTS}
         if vessel not in found:
             continue
         motion, part = found[vessel], own[vessel]
-        rho = part.positions - whole.barycentre
+        rho = part.positions - barycentre
         v = np.cross(omega, rho) + part.velocities - drift
         momentum = part.masses @ np.cross(rho, v) + _stored_beside(scene, vessel, own_wheels, omega)
         outputs |= {
-            f"{vessel}.origin": motion.origin - whole.barycentre,
-            f"{vessel}.centre_of_mass": motion.carry(np.array(table.centre_of_mass))[0] - whole.barycentre,
+            f"{vessel}.origin": motion.origin - barycentre,
+            f"{vessel}.centre_of_mass": motion.carry(np.array(table.centre_of_mass))[0] - barycentre,
             f"{vessel}.attitude": quaternion(motion.rotation),
             f"{vessel}.angular_velocity": motion.rotation.T @ (omega + motion.rate),
             f"{vessel}.angular_momentum": R_inertial_body @ momentum,

@@ -22,11 +22,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from supervessel.composite.bodies import composite_body, lookup_in
+from supervessel.composite.bodies import Lookup, composite_body, lookup_in
 from supervessel.composite.inertia import from_upper_triangle, ldl, ldl_solve
 from supervessel.composite.poses import constant
 from supervessel.composite.resolved import ResolvedScene
 from supervessel.composite.wheels import axes_of, free_inertia, placed_wheels, without_locked
+from supervessel.derivatives import named_function
 from supervessel.rotation.laws import LAWS
 
 Parts = Mapping[str, ca.SX]
@@ -45,7 +46,7 @@ class Change:
     keep_momentum    : omega, c, d -> omega - J_d^-1 ((J_d - J_c) omega + S_d - S_c), after a change from c to
                        d that keeps H; to the last bit omega where c and d are the same
     contact_momentum : p, k -> dH, (3,) [N m s], that closing docks bring, whose parts move by k at contact
-    docked_rate      : omega, dH, d -> omega + J_d^-1 dH, J_d the full tensor
+    docked_rate      : omega, dH, d -> omega + J_d^-1 dH, J_d the full tensor; omega under the law "none"
 
     The tensors that are inverted must be positive definite; it is not checked here.
     """
@@ -84,20 +85,22 @@ def change_functions(
         change += (wheels_after.axes - wheels.axes) @ stored
         held, held_of_momentum = held + wheels.axes @ stored, held + wheels.axes @ momenta[3:]
     return Change(
-        momentum_of=_function("momentum_of", {"omega": rates, "c": c}, kept @ omega + held),
-        rate_of_momentum=_function(
+        momentum_of=named_function("momentum_of", {"omega": rates, "c": c}, kept @ omega + held),
+        rate_of_momentum=named_function(
             "rate_of_momentum",
             {"momentum": momenta, "c": c},
             ldl_solve(*ldl(kept), momentum - held_of_momentum),
         ),
-        keep_momentum=_function(
+        keep_momentum=named_function(
             "keep_momentum", {"omega": rates, "c": c, "d": d}, omega - ldl_solve(*ldl(kept_after), change)
         ),
-        contact_momentum=_function("contact_momentum", {"p": p, "k": k}, contact_momentum(resolved, p, k)),
-        docked_rate=_function(
+        contact_momentum=named_function(
+            "contact_momentum", {"p": p, "k": k}, contact_momentum(resolved, p, k)
+        ),
+        docked_rate=named_function(
             "docked_rate",
             {"omega": rates, "momentum": added, "d": d},
-            omega + ldl_solve(*ldl(full), added),
+            omega if law is LAWS["none"] else omega + ldl_solve(*ldl(full), added),
         ),
     )
 
@@ -192,19 +195,21 @@ def spin_of(parts: Parts) -> ca.SX:
     return parts["momentum"][:3] if "momentum" in parts else ca.SX.zeros(3)
 
 
-def _function(name: str, arguments: Mapping[str, ca.SX], result: ca.SX) -> ca.Function:
-    return ca.Function(name, list(arguments.values()), [ca.densify(result)], list(arguments), ["result"])
-
-
 def contact_momentum(resolved: ResolvedScene, p: ca.SX, k: ca.SX) -> ca.SX:
     """Returns the angular momentum about the barycentre, (3,), of parts that move with k as they touch."""
     if not resolved.contact:
         return ca.SX.zeros(3)
+    lookup = lookup_at_contact(resolved, p, k)
+    body = without_locked(composite_body(resolved, lookup), placed_wheels(resolved, lookup))
+    return ca.SX.zeros(3) if body.spin is None else body.spin
+
+
+def lookup_at_contact(resolved: ResolvedScene, p: ca.SX, k: ca.SX) -> Lookup:
+    """Returns the inputs as docks close whose parts move by k, while ports that move stand still."""
     still = {variable.group for variable in resolved.shaping if variable.kind.key == "motion"}
     lookup = lookup_in((*resolved.shaping, *resolved.contact), ca.vertcat(p, k))
 
     def at_contact(group: str, value: ArrayLike) -> ca.SX:
         return constant(np.zeros(3)) if group in still else lookup(group, value)
 
-    body = without_locked(composite_body(resolved, at_contact), placed_wheels(resolved, at_contact))
-    return ca.SX.zeros(3) if body.spin is None else body.spin
+    return at_contact

@@ -53,6 +53,8 @@ class OutputKind:
     matrix      : whether it is a (3, 3) matrix, row by row, whose variables carry two indices
     axes        : whether it shows principal moments or axes, which are computed only for such outputs
     of_step     : whether it is a result of a communication step; the twin, which takes none, leaves it out
+    jump        : whether it tells what the last instant of change did; it changes at events only, and the
+                  twin, which knows no last one, leaves it out
     nominal     : magnitudes of the assembly -> its magnitude, for an importer's solver
     """
 
@@ -65,7 +67,13 @@ class OutputKind:
     matrix: bool = False
     axes: bool = False
     of_step: bool = False
+    jump: bool = False
     nominal: Callable[[Magnitudes], float] = lambda whole: 1.0
+
+    @property
+    def of_history(self) -> bool:
+        """Whether it does not follow from states and inputs as they are, so that the twin leaves it out."""
+        return self.of_step or self.jump
 
     def elements(self, group: str) -> list[tuple[str, str]]:
         """Returns name and label of each variable of an output.
@@ -159,6 +167,18 @@ OUTPUTS: dict[str, OutputKind] = {
             "m/s",
             "velocity of the barycentre relative to the root vessel's origin and axes, by ports that move",
         ),
+        OutputKind(
+            "barycentre_jump",
+            "m",
+            "jump of the barycentre at the last instant of change, inertial axes",
+            jump=True,
+        ),
+        OutputKind(
+            "barycentre_velocity_jump",
+            "m/s",
+            "jump of the barycentre's velocity at the last instant of change, inertial axes",
+            jump=True,
+        ),
     )
 }
 """Outputs of the whole, by name."""
@@ -197,8 +217,8 @@ VESSEL_OUTPUTS: dict[str, OutputKind] = {
         OutputKind(
             "velocity",
             "m/s",
-            "velocity of the centre of mass of {vessel} relative to the barycentre, inertial axes",
-            of_vessel=True,
+            "velocity of the centre of mass of {owner} relative to the barycentre, inertial axes",
+            owner="vessel",
         ),
     )
 }

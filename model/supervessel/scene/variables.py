@@ -26,7 +26,7 @@ class Variable:
     group     : the name without its index
     element   : place in its group, from 0
     boolean   : whether it is true or false; its numbers are then 1 and 0
-    discrete  : whether it is an input that changes at events only
+    discrete  : whether it is an input or an output that changes at events only
     jumps     : whether it is a state that an event can change
     """
 
@@ -170,6 +170,7 @@ def output_variables(scene: Scene) -> tuple[OutputVariable, ...]:
             _described(scene, kind, owner) + (f", {label}" if label else ""),
             group=group,
             element=i,
+            discrete=kind.jump,
             kind=kind,
             owner=owner,
         )

@@ -70,7 +70,7 @@ class Plant:
         self.u_variables = resolved.acting
         self.u_names = tuple(variable.name for variable in resolved.acting)
         self.x_names = (*X_NAMES, *(f"state.{name}.momentum" for name in scene.wheels))
-        self.y_names = tuple(v.name for v in self._model.resolved.outputs if not v.kind.of_step)
+        self.y_names = tuple(v.name for v in self._model.resolved.outputs if not v.kind.of_history)
         self.p = ca.SX.sym("p", len(free))
         self.u = ca.SX.sym("u", len(self.u_names))
         self.x = ca.SX.sym("x", len(self.x_names))
