@@ -227,6 +227,22 @@ def test_three_moments_share_the_excess_as_the_squares_of_their_rounding() -> No
     assert np.allclose(found.elements[:3], [1.005, 0.9995 + rest, 2.005 - 100.0 * rest], rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("moments", "reason"),
+    [
+        (["-0.02", "0.0", "-0.0"], "4 of that would be needed at least"),
+        (["1.0e300", "1.0e300", "2.5e300"], "3.33 of that would be needed at least"),
+        (["1.0", "1.0", "2.00000000000001"], "doubles do not tell"),
+        (["1e-400", "1.0", "2.1"], "doubles do not tell"),
+        (["1.000000000", "1e5", "2e5"], "doubles do not tell"),
+    ],
+)
+def test_numbers_at_the_ends_of_doubles_are_refused_with_a_reason(moments: list[str], reason: str) -> None:
+    sheet = sheet_of({"mass": 1.0, "moments": [WrittenNumber(x) for x in moments]})
+    assert sheet is not None
+    assert reason in mend(sheet).reason
+
+
 SHEET = """name = "sheet"
 root = "B"
 [vessels.B]

@@ -70,8 +70,7 @@ def _rigid_moments(place: str, vessel: Mapping[str, Any]) -> Iterator[str]:
         found = mend(sheet)
         if found.sheet is not None:
             return
-        problem += f"; mend = true moves each number by half a unit of its last digit, and {found.share:.3g} "
-        problem += "of that would be needed at least"
+        problem += f"; mend = true moves each number by half a unit of its last digit, and {found.reason}"
     yield f"{place}{sheet_text(vessel, sheet)}: {problem}"
 
 

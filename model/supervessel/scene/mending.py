@@ -23,8 +23,16 @@ from numpy.typing import NDArray
 from supervessel.problems import quantity
 from supervessel.scene.sheets import Sheet, sheet_of, sheet_problem, sheet_text, tensor_of
 
+MOST_UNITS, MOST_UNEVEN = 1e12, 1e8
+"""Most units of the last digit that a number may have, and most of one number's that are another's: doubles
+then tell the moves."""
+TOO_FINE = (
+    "the numbers are written so finely, or so unevenly, that doubles do not tell how far that is enough"
+)
 WEIGHTS = 0.1 ** np.arange(0.0, 11.5, 0.5)
-"""Weights t of the barrier, one after the other."""
+"""Weights t of the barrier, one after the other: moves are right to t of half a unit of the last digit."""
+TOLD = 1e-14
+"""Least weight over the largest number in units of the last digit: S is right to some 1e-16 of that."""
 CENTRED = 0.1
 """Newton's decrement from which a minimum counts as found."""
 MOST_STEPS = 100
@@ -37,12 +45,12 @@ Numbers = NDArray[np.float64]
 class Mended:
     """What comes of a sheet's numbers.
 
-    sheet : with numbers that a body can have; None where the rounding does not reach so far
-    share : largest move over half a unit of the last digit; without a sheet what would be needed at least
+    sheet  : with numbers that a body can have; None where they cannot be mended
+    reason : why they cannot, "" if they can
     """
 
     sheet: Sheet | None
-    share: float
+    reason: str = ""
 
 
 def mended_values(vessel: Mapping[str, Any]) -> dict[str, Any]:
@@ -86,18 +94,32 @@ def mend(sheet: Sheet) -> Mended:
 
     sheet : with moments that no body can have
     """
-    free = np.flatnonzero(sheet.halves > 0.0)
-    unit = float(np.max(sheet.halves))
+    unit, written = float(np.max(sheet.halves)), sheet.halves > 0.0
+    size = float(max(np.max(np.abs(sheet.elements)), np.max(np.abs(sheet.shift))))
+    even = np.all(written[:3]) and unit <= MOST_UNEVEN * float(np.min(sheet.halves[written]))
+    if not (even and size <= MOST_UNITS * unit):
+        return Mended(None, TOO_FINE)
+    free = np.flatnonzero(written)
     given = _second_moments((sheet.elements - sheet.shift) / unit)
     halves = sheet.halves[free] / unit
     moved_by = np.array([half * _second_moments(np.eye(6)[i]) for i, half in zip(free, halves, strict=True)])
-    moves, share = _inside(given, moved_by, halves)
+    share, weights = _least_share(given, moved_by), WEIGHTS[TOLD * size / unit <= WEIGHTS]
+    if share < 1.0:
+        moves, share = _inside(given, moved_by, halves, weights)
     if share >= 1.0:
-        return Mended(None, share)
+        return Mended(None, f"{share:.3g} of that would be needed at least")
     elements = sheet.elements.copy()
-    elements[free] += unit * halves * _nearest(given, moved_by, moves)
+    elements[free] += unit * halves * _nearest(given, moved_by, moves, weights)
     moved = replace(sheet, elements=elements)
-    return Mended(None, 1.0) if sheet_problem(moved) else Mended(moved, share)
+    return Mended(None, TOO_FINE) if sheet_problem(moved) else Mended(moved)
+
+
+def _least_share(given: Numbers, moved_by: Numbers) -> float:
+    """Returns a share s that moves must have at least: with smaller ones v.S v < 0 for one vector v."""
+    values, vectors = np.linalg.eigh(given)
+    v = vectors[:, 0]
+    reach = float(np.sum(np.abs(np.einsum("i,kij,j->k", v, moved_by, v))))
+    return -float(values[0]) / reach if reach > 0.0 else 0.0
 
 
 def _second_moments(elements: Numbers) -> Numbers:
@@ -105,12 +127,13 @@ def _second_moments(elements: Numbers) -> Numbers:
     return 0.5 * float(np.sum(elements[:3])) * np.eye(3) - tensor_of(elements)
 
 
-def _inside(given: Numbers, moved_by: Numbers, halves: Numbers) -> tuple[Numbers, float]:
-    """Returns moves y, (k,), with |y_i| < s and S > 0, and s; s is below 1, or the least one within 1e-9.
+def _inside(given: Numbers, moved_by: Numbers, halves: Numbers, weights: Numbers) -> tuple[Numbers, float]:
+    """Returns moves y, (k,), with |y_i| < s and S > 0, and s; s is below 1, or the least one.
 
     given    : S of the numbers as published, (3, 3)
     moved_by : what a move by half a unit of the last digit adds to S, (k, 3, 3), the diagonal's first
     halves   : half a unit of the last digit, (k,), the largest is 1
+    weights  : of the barrier
     """
     raised = 2.0 * (
         1.0 + max(0.0, -float(np.linalg.eigvalsh(given)[0]))
@@ -118,11 +141,13 @@ def _inside(given: Numbers, moved_by: Numbers, halves: Numbers) -> tuple[Numbers
     moves = np.zeros(len(halves))
     moves[:3] = raised / halves[:3]
     point = np.array([*moves, 2.0 * float(np.max(moves))])
-    for weight in WEIGHTS:
+    for weight in weights:
         for _ in range(MOST_STEPS):
             gradient, hessian = _barrier(given, moved_by, point[:-1], point[-1])
             gradient[-1] += 1.0 / weight
             step, decrement = _newton(gradient, hessian)
+            if not _is_inside(given, moved_by, point + step):
+                break
             point += step
             if point[-1] < 1.0:
                 return point[:-1], float(point[-1])
@@ -131,24 +156,34 @@ def _inside(given: Numbers, moved_by: Numbers, halves: Numbers) -> tuple[Numbers
     return point[:-1], float(point[-1])
 
 
-def _nearest(given: Numbers, moved_by: Numbers, moves: Numbers) -> Numbers:
+def _nearest(given: Numbers, moved_by: Numbers, moves: Numbers, weights: Numbers) -> Numbers:
     """Returns the moves y, (k,), of the least sum of squares with |y_i| < 1 and S > 0.
 
     moves : any with |y_i| < 1 and S > 0; for the others see `_inside`
     """
-    for weight in WEIGHTS:
+    for weight in weights:
         for _ in range(MOST_STEPS):
             gradient, hessian = (x[..., :-1] for x in _barrier(given, moved_by, moves, 1.0))
             step, decrement = _newton(gradient + moves / weight, hessian[:-1] + np.eye(len(moves)) / weight)
+            if not _is_inside(given, moved_by, np.append(moves + step, 1.0)):
+                break
             moves = moves + step
             if decrement < CENTRED:
                 break
     return moves
 
 
+def _is_inside(given: Numbers, moved_by: Numbers, point: Numbers) -> bool:
+    """Whether |y_i| < s and S > 0 hold for point = (y, s): rounding may lead outside."""
+    moves, most = point[:-1], point[-1]
+    S = given + np.tensordot(moves, moved_by, 1)
+    return bool(np.all(np.abs(moves) < most) and np.linalg.eigvalsh(S)[0] > 0.0)
+
+
 def _newton(gradient: Numbers, hessian: Numbers) -> tuple[Numbers, float]:
     """Returns a step of Newton's method that stays inside, and Newton's decrement."""
-    step: Numbers = np.linalg.solve(hessian, -gradient).astype(np.float64)
+    size = 1.0 / np.sqrt(np.diag(hessian))  # numbers rounded unevenly make the Hessian's sizes uneven
+    step: Numbers = size * np.linalg.solve(hessian * np.outer(size, size), -gradient * size)
     decrement = sqrt(max(0.0, -float(gradient @ step)))
     return step / (1.0 + decrement), decrement
 

@@ -72,7 +72,8 @@ def sheet_of(vessel: Mapping[str, Any]) -> Sheet | None:
         mass, centre = vessel.get("mass"), _numbers(vessel.get("centre_of_mass", (0.0, 0.0, 0.0)))
         if not is_number(mass) or centre is None or keys[0] == "pmi":
             return None
-        shift = float(mass) * _elements(_offset(*map(float, centre)))  # type: ignore[arg-type]
+        with np.errstate(over="ignore", invalid="ignore"):  # what is beyond all numbers is reported
+            shift = float(mass) * _elements(_offset(*map(float, centre)))  # type: ignore[arg-type]
     elements, halves = np.array(written).T
     return Sheet(keys[0], elements, halves, shift)
 
