@@ -288,6 +288,15 @@ def test_mended_numbers_read_again_stay(tmp_path: Any) -> None:
     assert again.notes == ()
 
 
+def test_numbers_of_any_kind_are_mended_and_written() -> None:
+    given = parse_scene(alone(inertia=(np.float64(2.5), 1, np.float64(3.6)), mend=True))
+    assert "inertia = [2.5, 1, 3.6]" in scene_text(given)
+    assert np.allclose(np.diag(given.vessels["B"].tensor or 0.0), [2.501, 1.098, 3.599], rtol=0.0, atol=1e-3)
+    rows = [[1.0, 0.0, 0.1], [0.0, 2.0, 0.0], [0.1, 0.0, 3.1]]
+    (note,) = parse_scene(alone(inertia=rows, mend=True)).notes
+    assert "mended to inertia = [[1.0" in note
+
+
 def test_the_page_tells_what_was_mended(tmp_path: Any) -> None:
     given = loaded(tmp_path, SHEET)
     files = documentation(given, variable_table(equations(given)), 3, None)

@@ -44,7 +44,7 @@ from supervessel.scene.numbers import (
     WheelInertia,
     WheelMomentum,
 )
-from supervessel.scene.sheets import about_centre, tensor_from_moments
+from supervessel.scene.sheets import about_centre, as_published, tensor_from_moments
 
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 
@@ -174,7 +174,7 @@ class Vessel(Table):
     def _mended(cls, raw: Any, read: ModelWrapValidatorHandler["Vessel"]) -> "Vessel":
         moved = mended_values(raw) if isinstance(raw, Mapping) else {}
         vessel = read({**raw, **moved} if moved else raw)
-        vessel._published.update({key: raw[key] for key in moved})
+        vessel._published.update({key: as_published(raw[key]) for key in moved})
         return vessel
 
     @property

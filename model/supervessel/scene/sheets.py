@@ -100,6 +100,13 @@ def sheet_text(vessel: Mapping[str, Any], sheet: Sheet) -> str:
     return f".{sheet.key} = {quantity(value, sheet.unit)}{beside}"
 
 
+def as_published(value: Any) -> Any:
+    """Returns numbers, or lists of them, as they are written: with their text, or as plain numbers."""
+    if isinstance(value, list | tuple):
+        return [as_published(one) for one in value]
+    return value if isinstance(value, WrittenNumber | int) else float(value)
+
+
 def tensor_of(elements: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
     """Returns the symmetric tensor, (3, 3), that has six elements at PLACES."""
     tensor = np.empty((3, 3))
