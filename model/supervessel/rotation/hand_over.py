@@ -98,7 +98,7 @@ def _jumps(
 ) -> tuple[ca.SX, ca.SX]:
     """Returns the jumps of the barycentre, (3,) [m], and of its velocity, (3,) [m/s], body axes.
 
-    Source: [EQ] What an instant of change does to the barycentre, eqs. (19), (20).
+    Source: [EQ] What an instant of change does to the barycentre, eqs. (24), (25).
 
     parts            : of the four composites, by name
     omega            : as the change begins, (3,) [rad/s], body axes
@@ -121,7 +121,7 @@ def _left(
     parts : of the composite before and after the change
     x     : as the change begins
     jumps : of the barycentre, (3,) [m], and of its velocity, (3,) [m/s], body axes
-    They are relative to the barycentre after the change, eqs. (21) and (22).
+    They are relative to the barycentre after the change, eqs. (26) and (27).
     """
     before, after = (vessel_pieces(resolved, name, of) for of in parts)
     (jump, velocity_jump), omega, attitude = jumps, x[4:7], unit(x[:4])

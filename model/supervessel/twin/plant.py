@@ -183,7 +183,10 @@ class Plant:
 
     @cached_property
     def outputs(self) -> TwinFunction:
-        """x, u, p -> y, the FMU's outputs but error_estimate, which follows from a step.
+        """x, u, p -> y, the FMU's outputs but those of past steps and changes.
+
+        These are error_estimate, error_bound and the jumps of the barycentre. Outputs of a vessel that leaves
+        are 0 at once.
 
         Example:
             >>> y = twin.outputs(twin.x_start, [0, 0, 0], twin.p_start)
