@@ -109,7 +109,6 @@ SCENARIO_PROBLEMS = {
         [
             "side.scn:23: PRPLEVEL 1.5: a level must be a number from 0 to 1",
             'side.scn:23: PRPLEVEL "1": must be TANK:LEVEL',
-            'side.scn:23: PRPLEVEL of tank 2: class "Glider" of "GL-01" has tanks 0 to 1',
             "side.scn:23: PRPLEVEL x: a level must be a number from 0 to 1",
             "side.scn:23: PRPLEVEL 1:0.5: tank 1 has a level already",
             "side.scn:18: PRPLEVEL nan: a level must be a number from 0 to 1",

@@ -2,11 +2,11 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from supervessel.orbiter.text import Place, ScenarioError, numbers, read_lines, unread
+from supervessel.orbiter.text import Place, ScenarioError, foreign, numbers, read_lines, unread
 from supervessel.problems import listed, printable, quantity, unknown
 from supervessel.scene.numbers import is_number
 from supervessel.shell.reading import ReadingError, read_toml
@@ -23,12 +23,18 @@ TABLE_KEYS = (
 )
 """Keys of a class in a table; the last three are not used."""
 
+COMPLETE = ("empty_mass", "propellant", "pmi", "dock")
+"""Keys of a single ship beside which nothing of its class is needed."""
+
 MOST_PORTS = 100
 MOST_TANKS = 100
 """Docking ports and tanks that a class may have: every ship of the class has each of them."""
 
 LONG_AGO = ("DockRef", "DockDir", "DockRot")
 """Keys of the one docking port of old .cfg files; it comes before those of the list."""
+
+USED = re.compile("mass|inertia|size|maxfuel|module|baseclass|dockref|dockdir|dockrot|propellantresource.*")
+"""Keys of .cfg files that are read, in small letters."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +56,7 @@ class VesselClass:
     tanks      : what each holds when full [kg], in the order of PRPLEVEL
     fallback   : why the moments are a guess, "" where they are given
     module     : the code that may change all this, "" where there is none or the numbers are the code's
+    sections   : the table's sections that it is from, as keys of `section_place`
     """
 
     empty_mass: float
@@ -60,13 +67,14 @@ class VesselClass:
     tanks: tuple[float, ...]
     ports: tuple[ClassPort, ...]
     module: str = ""
+    sections: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Library:
     """Where classes are looked for, by their names in small letters: a table, which goes first, and files.
 
-    table : name -> key and table of each class of that name
+    table : name -> key and table of each section of that name: of a single ship or of a class
     files : folder -> last part of a name -> the parts of the whole name and the .cfg file
     """
 
@@ -105,16 +113,49 @@ def _class_files(folder: Path) -> dict[str, list[tuple[tuple[str, ...], Path]]]:
     return found
 
 
-def find_class(library: Library, name: str, asked: str) -> VesselClass:
-    """Returns the class of a name, in any case; `asked` says who needs it.
+def section_key(library: Library, name: str) -> str:
+    """Returns the key of the table's section of a name, in any case; "" where it has none."""
+    keys = [key for key, _ in library.table.get(name.casefold(), ())]
+    return name if name in keys else next(iter(keys), "")
+
+
+def find_class(library: Library, ship: str, name: str, asked: str) -> VesselClass:
+    """Returns the class of a ship, by the names of both, in any case; `asked` says who needs it.
+
+    The table's section of the ship goes first; what it does not give is that of the class, if there is one.
+    Raises ScenarioError with what is missing or wrong.
+    """
+    key = section_key(library, ship)
+    if not key or key == section_key(library, name):
+        found = _class(library, name, asked)
+        if found is None:
+            raise ScenarioError([_nowhere(library, name, asked)])
+        return found
+    table = dict(library.table[key.casefold()])[key]
+    known = isinstance(table, dict) and all(one in table for one in COMPLETE)
+    of_class = None if known else _class(library, name, asked)
+    try:
+        return _from_table(section_place(library, key), table, of_class)
+    except ScenarioError as error:
+        lost = [] if known or of_class else [_nowhere(library, name, asked)]
+        raise ScenarioError([*error.problems, *lost]) from None
+
+
+def section_place(library: Library, key: str) -> Place:
+    """Returns where a section of the table stands, by its key."""
+    assert library.table_path is not None
+    return Place(library.table_path, key=f"[{printable(key)}]")
+
+
+def _class(library: Library, name: str, asked: str) -> VesselClass | None:
+    """Returns the class of a name, in any case, None where it is nowhere.
 
     Below a folder the file is, first of all, Vessels/NAME.cfg, then NAME.cfg, then any other.
     Raises ScenarioError with what is missing or wrong.
     """
-    classes = sorted(library.table.get(name.casefold(), ()), key=lambda found: found[0] != name)
-    if classes and library.table_path is not None:
-        key, table = classes[0]
-        return _from_table(Place(library.table_path, key=f"[{printable(key)}]"), table)
+    key = section_key(library, name)
+    if key:
+        return _from_table(section_place(library, key), dict(library.table[key.casefold()])[key])
     parts = tuple(re.split(r"[\\/]", name.casefold()))
     for files in library.files.values():
         ranked: dict[int, list[Path]] = {}
@@ -128,10 +169,14 @@ def find_class(library: Library, name: str, asked: str) -> VesselClass:
             raise ScenarioError([f"{asked}: class {quantity(name)} is in {several}"])
         if found:
             return _from_cfg(found[0])
+    return None
+
+
+def _nowhere(library: Library, name: str, asked: str) -> str:
     searched = [printable(str(library.table_path))] if library.table_path else []
     searched += [f"the .cfg files below {printable(str(folder))}" for folder in library.files]
     where = " or ".join(searched) or "any file: neither --config FOLDER nor --table FILE.toml is given"
-    raise ScenarioError([f"{asked}: class {quantity(name)} is not in {where}"])
+    return f"{asked}: class {quantity(name)} is not in {where}"
 
 
 def _from_cfg(path: Path) -> VesselClass:
@@ -150,7 +195,12 @@ def _from_cfg(path: Path) -> VesselClass:
             inside = word.removeprefix("BEGIN_")
         elif "=" in line:
             key, _, value = line.partition("=")
-            values.setdefault(key.strip().casefold(), (Place(path, number), value.strip()))
+            key = key.strip().casefold()
+            if USED.fullmatch(key):
+                values.setdefault(key, (Place(path, number), value.strip()))
+    strange = [problem for line in (*values.values(), *ports) for problem in foreign(*line)]
+    if strange:
+        raise ScenarioError(strange)
     shown = printable(str(path))
     problems = [f"{shown}: BEGIN_{printable(inside)} without END_{printable(inside)}"] if inside else []
     ports = [] if inside else ports
@@ -258,8 +308,11 @@ def _port_of(nine: Sequence[float], place: Place) -> ClassPort:
     return ClassPort((px, py, pz), (dx, dy, dz), (ax, ay, az), place)
 
 
-def _from_table(place: Place, table: Any) -> VesselClass:
-    """Returns the class that a table of TOML describes. Raises ScenarioError with every problem."""
+def _from_table(place: Place, table: Any, of_class: VesselClass | None = None) -> VesselClass:
+    """Returns the class that a section of a table describes. Raises ScenarioError with every problem.
+
+    of_class : what the section does not give; None: nothing
+    """
     if not isinstance(table, dict):
         raise ScenarioError([f"{place}: must be a table"])
     problems = [f"{place}: {unknown('key', key, TABLE_KEYS)}" for key in table if key not in TABLE_KEYS]
@@ -278,15 +331,24 @@ def _from_table(place: Place, table: Any) -> VesselClass:
     mass = read("empty_mass", 0, "a number >= 0 (kg)")
     tanks = read("propellant", None, "a list of numbers >= 0 (kg)") or ()
     pmi, size = read("pmi", 3, "three numbers >= 0 (m2)"), read("size", 0, "a number >= 0 (m)")
-    problems += [] if "empty_mass" in table else [f"{place}: empty_mass is missing"]
-    problems += [] if "pmi" in table or "size" in table else [f"{place}: neither pmi nor size"]
     ports = _table_ports(place, table.get("dock", []), problems)
     problems += _too_many(str(place), len(ports), len(tanks))
-    if mass is None or (pmi is None and size is None) or problems:
+    sized = "pmi" in table or "size" in table
+    if of_class is None:
+        problems += [] if "empty_mass" in table else [f"{place}: empty_mass is missing"]
+        problems += [] if sized else [f"{place}: neither pmi nor size"]
+    if problems:
         raise ScenarioError(problems)
-    key = "pmi" if pmi is not None else "size"
-    moments = _moments(pmi, size, _at(place, key))
-    return VesselClass(mass[0], _at(place, "empty_mass"), *moments, tanks, tuple(ports))
+    given: dict[str, Any] = {}
+    if mass is not None:
+        given |= {"empty_mass": mass[0], "mass_place": _at(place, "empty_mass")}
+    if sized:
+        moments = _moments(pmi, size, _at(place, "size" if pmi is None else "pmi"))
+        given |= dict(zip(("pmi", "pmi_place", "fallback"), moments, strict=True))
+    given |= {"tanks": tanks} if "propellant" in table or of_class is None else {}
+    given |= {"ports": tuple(ports)} if "dock" in table or of_class is None else {}
+    given["sections"] = (place.key, *(of_class.sections if of_class else ()))
+    return replace(of_class, **given) if of_class else VesselClass(**given)
 
 
 def _at(place: Place, key: str) -> Place:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from supervessel.orbiter.scenario import Scenario
-from supervessel.orbiter.text import Place
+from supervessel.orbiter.text import Place, foreign
 from supervessel.problems import listed, printable, quantity, unknown
 
 MENTION = re.compile(r"(\d{1,4}):(\d{1,4}),(\S+)", re.ASCII)
@@ -49,9 +49,8 @@ def mentions(scenario: Scenario, problems: list[str]) -> list[Mention]:
                 port, mate_port, mate = int(match[1]), int(match[2]), match[3]
                 found.append(Mention(ship.name, port, mate, mate_port, entry.place))
             else:
-                problems.append(
-                    f"{entry.place}: {quantity(ship.name)}: DOCKINFO {quantity(word)}: must be PORT:PORT,NAME"
-                )
+                where = f"{entry.place}: {quantity(ship.name)}: DOCKINFO {quantity(word)}"
+                problems += foreign(entry.place, word) or [f"{where}: must be PORT:PORT,NAME"]
     return found
 
 

@@ -7,11 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from supervessel.loading import parse_scene
-from supervessel.orbiter.classes import ClassPort, Library, VesselClass, find_class, read_library
+from supervessel.orbiter.classes import (
+    ClassPort,
+    Library,
+    VesselClass,
+    find_class,
+    read_library,
+    section_key,
+    section_place,
+)
 from supervessel.orbiter.docks import Mention, assemblies, docks, mentions
-from supervessel.orbiter.scenario import Entry, Scenario, Ship, read_scenario
+from supervessel.orbiter.scenario import KEYS, LEVELS, Entry, Scenario, Ship, read_scenario
 from supervessel.orbiter.start import saved_motion, start_of
-from supervessel.orbiter.text import Note, ScenarioError, numbers
+from supervessel.orbiter.text import Note, Place, ScenarioError, foreign, numbers
 from supervessel.orbiter.writing import Assembled, Member, Start, scene_text
 from supervessel.problems import SceneError, few_suggestions, listed, printable, quantity, unknown
 from supervessel.scene.consistency import direction_problems
@@ -20,6 +28,9 @@ from supervessel.scene.numbers import triangle_problem
 from supervessel.scene.schema import Convention, Scene
 
 LEVEL = re.compile(r"(\d{1,4}):(\S+)", re.ASCII)
+MOST_UNUSED = 100
+"""Sections of a table that are named as not used; of the others the number is told."""
+
 ATTACHED = re.compile(r"\d+:\d+,(\S+)", re.ASCII)
 
 
@@ -44,7 +55,8 @@ def import_scenario(
 
     vessel     : a ship of the assembly, which becomes the root; "": the one that has the focus
     config     : folders with the .cfg files of vessel classes, at any depth
-    table      : TOML file of classes that exist only in Orbiter's code; it goes before the .cfg files
+    table      : TOML file of single ships, which go before their classes, and of classes that exist only in
+                 Orbiter's code, which go before the .cfg files
     convention : of the scene; None: "orbiter" where a vessel's moments ask for it, else "rigid_body"
     Raises ScenarioError with every problem found, each with file and line.
     """
@@ -64,6 +76,9 @@ def import_scenario(
         raise ScenarioError(
             [f"{where}: {len(names)} vessels are docked; at most {MOST_VESSELS} are possible"]
         )
+    strange = _foreign(found, names)
+    if strange:
+        raise ScenarioError(dict.fromkeys([*problems, *strange]))
     mated: list[Mention] = []
     for dock in docks(found, names, said):
         problems.append(dock) if isinstance(dock, str) else mated.append(dock)
@@ -72,7 +87,7 @@ def import_scenario(
         _levels(found.ships[name], problems)  # what is wrong with them is told all the same
     members = _members(found, mated, classes, problems, notes)
     key = _convention(members, convention, problems, notes)
-    notes += _doubts(found, members)
+    notes += [*_doubts(found, members), *_unused(library, members)]
     saved = {name: saved_motion(found.ships[name], problems) for name in names}
     if problems:
         raise ScenarioError(dict.fromkeys(problems))
@@ -82,6 +97,19 @@ def import_scenario(
     _checked(final, start)
     sources = dict.fromkeys([found.path, *(member.of.mass_place.path for member in members.values())])
     return Imported(scene_text(final, start), tuple(map(str, final.notes)), tuple(sources))
+
+
+def _foreign(found: Scenario, names: Sequence[str]) -> list[str]:
+    """Returns what is not UTF-8 in the lines that are used of ships, or why they cannot be told."""
+    problems = []
+    for ship in (found.ships[name] for name in names):
+        problems += foreign(ship.place, f"{ship.name}:{ship.class_name}")
+        for entry in (entry for entry in ship.entries if entry.key in KEYS):
+            problems += foreign(entry.place, " ".join(entry.words))
+        if ship.unclosed:
+            begins = f"{ship.unclosed.place}: {ship.unclosed} in {quantity(ship.name)} begins a block"
+            problems.append(f"{begins} without end; which lines after it are the vessel's own cannot be told")
+    return problems
 
 
 def _members(
@@ -141,18 +169,21 @@ def _classes(
     scenario: Scenario, names: Sequence[str], library: Library, problems: list[str]
 ) -> dict[str, VesselClass]:
     """Returns the classes of ships by their names, without those that cannot be had: each is told once."""
-    found: dict[str, VesselClass | None] = {}
+    found: dict[tuple[str, str], VesselClass | None] = {}
+    classes: dict[str, VesselClass] = {}
     for name in names:
         ship = scenario.ships[name]
-        if ship.class_name in found:
-            continue
-        try:
-            found[ship.class_name] = find_class(library, ship.class_name, f"{ship.place}: {quantity(name)}")
-        except ScenarioError as error:
-            found[ship.class_name] = None
-            problems += error.problems
-    classes = {name: found[scenario.ships[name].class_name] for name in names}
-    return {name: made for name, made in classes.items() if made is not None}
+        which = (section_key(library, name), ship.class_name)
+        if which not in found:
+            try:
+                found[which] = find_class(library, name, ship.class_name, f"{ship.place}: {quantity(name)}")
+            except ScenarioError as error:
+                found[which] = None
+                problems += error.problems
+        made = found[which]
+        if made is not None:
+            classes[name] = made
+    return classes
 
 
 def _used_ports(
@@ -208,7 +239,7 @@ class Levels:
 
 def _levels(ship: Ship, problems: list[str]) -> Levels:
     """Returns what PRPLEVEL or FUEL says, the later of the two; without either tanks are full."""
-    known = [entry for entry in ship.entries if entry.key in ("PRPLEVEL", "FUEL")]
+    known = [entry for entry in ship.entries if entry.key in LEVELS]
     if not known:
         return Levels(None, {}, 1.0)
     entry = known[-1]
@@ -237,7 +268,7 @@ def _masses(
         for tank in sorted(set(levels.given) - set(range(count))):
             has = f"tanks 0 to {count - 1}" if count else "no tanks"
             whose = f"class {quantity(ship.class_name)} of {quantity(ship.name)} has {has}"
-            problems.append(f"{entry.place}: PRPLEVEL of tank {tank}: {whose}")
+            notes.append(Note(entry.place, f"PRPLEVEL of tank {tank}: {whose}; not used"))
         for tank in sorted(set(range(count)) - set(levels.given)):
             text = f"{quantity(ship.name)} has no level of tank {tank}: taken as empty"
             notes.append(Note(entry.place, text))
@@ -293,9 +324,46 @@ def _doubts(scenario: Scenario, members: Mapping[str, Member]) -> Iterator[Note]
                 f"class {quantity(member.ship.class_name)} has code of its own, module "
                 f"{quantity(member.of.module)}, which may change what its file says",
             )
-        for entry in member.ship.entries:
+        yield from _levels_of_code(member.ship)
+        for entry in (*member.ship.entries, *(inner for _, inner in member.ship.code)):
             if "MASS" in (entry.key, *(word.upper() for word in entry.words)):
                 yield Note(entry.place, f"{entry}: a line for the code of {quantity(name)}, not read")
+
+
+def _levels_of_code(ship: Ship) -> Iterator[Note]:
+    """Yields where blocks of a ship's code hold levels too: the first one of each block."""
+    own = next((entry for entry in reversed(ship.entries) if entry.key in LEVELS), None)
+    counts = f"the vessel's own is in line {own.place.line}" if own else "the vessel has none of its own"
+    seen: set[Place] = set()
+    for opening, entry in ship.code:
+        if entry.key in LEVELS and opening.place not in seen:
+            seen.add(opening.place)
+            whose = f"a level in the block {opening} of the code of {quantity(ship.name)}"
+            yield Note(entry.place, f"{entry}: {whose}, not read; {counts}")
+
+
+def _unused(library: Library, members: Mapping[str, Member]) -> Iterator[Note]:
+    """Yields which sections of the table give no number, and what may be meant otherwise than it is taken."""
+    used = {section for member in members.values() for section in member.of.sections}
+    by_class = {member.ship.class_name.casefold() for member in members.values()}
+    unused = []
+    for key, _ in (section for sections in library.table.values() for section in sections):
+        place = section_place(library, key)
+        if place.key not in used:
+            unused.append(place)
+    for name, member in members.items():
+        key = section_key(library, name)
+        if key and name.casefold() in by_class - {member.ship.class_name.casefold()}:
+            text = f"taken for the vessel {quantity(name)}, and for the class of this name as well"
+            yield Note(section_place(library, key), text)
+    yield from (
+        Note(place, "not used: no vessel of the assembly takes a number from it")
+        for place in unused[:MOST_UNUSED]
+    )
+    if len(unused) > MOST_UNUSED:
+        yield Note(
+            unused[MOST_UNUSED], f"not used, and {len(unused) - MOST_UNUSED - 1} more sections after it"
+        )
 
 
 def _checked(parts: Assembled, start: Start) -> Scene:

@@ -1,5 +1,10 @@
-"""Orbiter's scenario files: the ships, their lines, and which of them has the focus."""
+"""Orbiter's scenario files: the ships, their lines, and which of them has the focus.
 
+A ship's lines are read by the code of its class, if it has some, which leaves to Orbiter what it does not
+know itself. Blocks of lines in them, a line that opens and a line that closes, are that code's alone.
+"""
+
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +14,17 @@ from supervessel.problems import printable, quantity
 
 KEYS = frozenset({"STATUS", "RPOS", "AROT", "VROT", "PRPLEVEL", "FUEL", "DOCKINFO", "ATTACHED"})
 """Keys of a ship that are read; a ship has each at most once."""
+
+LEVELS = frozenset({"PRPLEVEL", "FUEL"})
+"""Keys that say how full tanks are."""
+
+OPENING = (
+    (re.compile(r"BEGIN_(.+)"), r"END_\1"),
+    (re.compile(r"(.+)_BEGIN"), r"\1_END"),
+    (re.compile(r"@(?!END)(.+)"), r"@END\1"),
+    (re.compile(r"<(?!/)(.+)>"), r"</\1>"),
+)
+"""Keys in capitals that open a block, and the key that closes it."""
 
 
 @dataclass(frozen=True)
@@ -25,12 +41,20 @@ class Entry:
 
 @dataclass(frozen=True)
 class Ship:
-    """A vessel of a scenario; its class is its name where the scenario gives none."""
+    """A vessel of a scenario; its class is its name where the scenario gives none.
+
+    entries  : its own lines
+    code     : lines in blocks of its class's code, each with the line that opens the block
+    unclosed : a line that begins like a block but has no end, after which there are lines with KEYS; None
+               where there is none
+    """
 
     name: str
     class_name: str
     place: Place
     entries: tuple[Entry, ...]
+    code: tuple[tuple[Entry, Entry], ...] = ()
+    unclosed: Entry | None = None
 
     def entry(self, key: str) -> Entry | None:
         """Returns the line with a key, None if there is none."""
@@ -106,8 +130,9 @@ def _ship(place: Place, head: str, entries: list[Entry], problems: list[str]) ->
     if not name or head.split(maxsplit=1)[0].upper() in KEYS:
         problems.append(f"{place}: {quantity(head)}: must be NAME or NAME:CLASS of a vessel")
         return
+    own, code, unclosed = _blocks(entries)
     first: dict[str, Entry] = {}
-    for entry in entries:
+    for entry in own:
         if entry.key in first and entry.key in KEYS:
             before = first[entry.key].place.line
             problems.append(
@@ -115,4 +140,56 @@ def _ship(place: Place, head: str, entries: list[Entry], problems: list[str]) ->
                 "is an END missing?"
             )
         first.setdefault(entry.key, entry)
-    yield Ship(name, class_name or name, place, tuple(entries))
+    yield Ship(name, class_name or name, place, tuple(own), tuple(code), unclosed)
+
+
+def _blocks(entries: Sequence[Entry]) -> tuple[list[Entry], list[tuple[Entry, Entry]], Entry | None]:
+    """Returns a ship's own lines, those in blocks, and the line that leaves open which are which: see `Ship`.
+
+    A line with words after its key that no line closes is one of its own: it gives a value.
+    """
+    last = {entry.key: place for place, entry in enumerate(entries)}
+    own: list[Entry] = []
+    code: list[tuple[Entry, Entry]] = []
+    opened: Entry | None = None
+    unclosed: Entry | None = None
+    place = 0
+    while place < len(entries):
+        entry = entries[place]
+        closing = _closing(entry.key)
+        if closing and last.get(closing, -1) > place:
+            end = _end(entries, place, closing)
+            code += [(entry, inner) for inner in entries[place + 1 : end]]
+            place = end + 1
+            continue
+        if closing and not entry.words:
+            opened = opened or entry
+        elif entry.key in KEYS:
+            unclosed = unclosed or opened
+        own.append(entry)
+        place += 1
+    return own, code, unclosed
+
+
+def _closing(key: str) -> str:
+    """Returns the key of the line that closes a block, "" for a key that opens none."""
+    for opening, closing in OPENING:
+        match = opening.fullmatch(key)
+        if match:
+            return match.expand(closing)
+    return ""
+
+
+def _end(entries: Sequence[Entry], begin: int, closing: str) -> int:
+    """Returns the place of the line that closes a block; blocks of the same name may be within it.
+
+    Where one of those has no end, that is the last line that closes one.
+    """
+    depth = end = 0
+    for place in range(begin, len(entries)):
+        key = entries[place].key
+        depth += (key == entries[begin].key) - (key == closing)
+        end = place if key == closing else end
+        if depth == 0:
+            break
+    return end

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from supervessel.problems import LONGEST_PROBLEM, first, lines, printable
-from supervessel.shell.reading import LARGEST_TEXT, ReadingError, read_text
+from supervessel.shell.reading import LARGEST_TEXT, ReadingError, not_utf8, read_text
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
@@ -68,13 +68,20 @@ def unread(path: Path, error: ReadingError) -> ScenarioError:
 def read_lines(path: Path) -> list[str]:
     """Returns the lines of a file without comments (from a semicolon on) and outer blanks.
 
-    Raises ScenarioError where it cannot be read.
+    Bytes that are not UTF-8 are kept, see `read_text`; what is used of a line passes `foreign` first.
+    Raises ScenarioError where the file cannot be read.
     """
     try:
-        text = read_text(path, LARGEST_TEXT)
+        text = read_text(path, LARGEST_TEXT, foreign=True)
     except ReadingError as error:
         raise unread(path, error) from None
     return [line.partition(";")[0].strip() for line in text.split("\n")]
+
+
+def foreign(place: Place, text: str) -> list[str]:
+    """Returns the problem of a text from `read_lines` that has bytes which are not UTF-8, if it has some."""
+    problem, _ = not_utf8(text)
+    return [f"{place}: {problem}"] if problem else []
 
 
 def numbers(words: Sequence[str], count: int) -> tuple[float, ...] | None:

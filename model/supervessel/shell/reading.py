@@ -34,6 +34,8 @@ BRACKETS = re.compile(rf"{STRING}|{COMMENT}|([\[\]{{}}])", re.DOTALL)
 NOTHING = bytes(set(range(256)) - set(b"[]{}\"'#\n=,."))
 """What brackets, strings and comments do without, and what stands between two strings."""
 SQUARE = str.maketrans("{}", "[]")
+NOT_TEXT = re.compile("[\0\udc80-\udcff]")
+"""A null, and what stands for a byte that is not UTF-8."""
 PARTS = re.compile(
     rf"(?P<part>{STRING}|[^\s\"'#.,=\[\]{{}}]++)|(?P<dot>\.)|{COMMENT}|[,=\[\]{{}}\n]", re.DOTALL
 )
@@ -61,9 +63,10 @@ def read_toml(path: Path, number: Callable[[str], Any] = float) -> dict[str, Any
         raise ReadingError(f"is not TOML: {error}") from None
 
 
-def read_text(path: Path, most: int) -> str:
+def read_text(path: Path, most: int, foreign: bool = False) -> str:
     """Returns the text of a file of at most so many bytes, without a byte order mark. Raises ReadingError.
 
+    foreign : whether bytes that are not UTF-8 are accepted; "\\udc80" to "\\udcff" then stand for them
     A file is what is on a disk; pipes are read only where they were handed over, as /dev/stdin or /dev/fd/N:
     any other may keep us waiting for ever.
     """
@@ -77,19 +80,27 @@ def read_text(path: Path, most: int) -> str:
         raise ReadingError("cannot be read: no file has such a name") from None
     if len(raw) > most:
         raise ReadingError(f"is longer than {most} bytes; at most that many are read")
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise ReadingError(
-            f"is not UTF-8 text (byte 0x{raw[error.start]:02x})", raw.count(b"\n", 0, error.start) + 1
-        ) from None
-    if "\0" in text:
-        raise ReadingError("is not UTF-8 text (byte 0x00)", _line(text, text.index("\0")))
+    text = raw.decode("utf-8-sig", "surrogateescape")
+    if "\0" in text or not foreign:
+        problem, place = not_utf8(text)
+        if problem:
+            raise ReadingError(problem, _line(text, place))
     if len(text) > LONGEST_LINE:
         for number, line in enumerate(text.split("\n"), start=1):
             if len(line) > LONGEST_LINE:
                 raise ReadingError(f"{len(line)} characters; a line has at most {LONGEST_LINE}", number)
     return text
+
+
+def not_utf8(text: str) -> tuple[str, int]:
+    """Returns the first byte of a text, as `read_text` returns it, that is not UTF-8, in words, and where.
+
+    "" and 0 where there is none. A null counts as one.
+    """
+    found = NOT_TEXT.search(text)
+    if found is None:
+        return "", 0
+    return f"is not UTF-8 text (byte 0x{ord(found[0]) & 0xFF:02x})", found.start()
 
 
 def _read(path: Path, most: int) -> bytes:
