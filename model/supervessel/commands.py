@@ -50,7 +50,10 @@ def _add_import(parser: argparse.ArgumentParser) -> None:
         help="folders with vessel classes (.cfg), at any depth",
     )
     parser.add_argument(
-        "--table", type=Path, metavar="FILE.toml", help="vessel classes that exist only in code"
+        "--table",
+        type=Path,
+        metavar="FILE.toml",
+        help="vessel classes that exist only in code, and single vessels, by name",
     )
     parser.add_argument(
         "--convention",

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from supervessel.composite.docks import TooManyWaysError
+from supervessel.composite.docks import TooManyWaysError, alone_as_given
 from supervessel.composite.resolved import resolve
 from supervessel.composite.start import composite_at_start, principal_moments, turning_at_start
 from supervessel.orbit import orbit_problem
-from supervessel.problems import SceneError, few_suggestions, key_path, quantity, unknown
+from supervessel.problems import SceneError, few_suggestions, key_path, printable, quantity, unknown
 from supervessel.scene.consistency import consistency_problems
 from supervessel.scene.names import misnamed_courses, naming_problems, size_problems
 from supervessel.scene.numbers import LARGEST_PLACE, WrittenNumber
@@ -82,6 +82,7 @@ def parse_scene(raw: Mapping[str, Any], source: str = "scene") -> Scene:
     if scene is None or problems:
         raise SceneError(source, problems)
     problems += _range_problems(scene) + _course_problems(scene) + _orbit_problems(scene)
+    problems += _bound_problems(scene)
     problems += _composite_problems(scene)
     if problems:
         raise SceneError(source, problems)
@@ -147,6 +148,16 @@ def _orbit_problems(scene: Scene) -> list[str]:
         return []
     reason = orbit_problem(orbit.position, orbit.velocity, scene.gravity.mu)
     return [f"experiment.orbit.{reason}"] if reason else []
+
+
+def _bound_problems(scene: Scene) -> list[str]:
+    """Returns why no error is bounded: the bounds are for moments that a rigid body can have."""
+    if not alone_as_given(scene):
+        return []
+    root = f"{printable(scene.root)} alone turns with its moments as given"
+    why = f'by convention = "orbiter" {root}, which may be those of no rigid body: no error is bounded'
+    asked = {"accuracy": scene.accuracy, "outputs.names: error_bound": "error_bound" in scene.outputs.names}
+    return [f"{place}: {why}" for place, given in asked.items() if given]
 
 
 def _composite_problems(scene: Scene) -> list[str]:

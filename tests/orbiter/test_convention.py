@@ -91,17 +91,6 @@ def test_moments_of_a_rigid_body_are_untouched():
     assert abs(default.inertia[0, 2]) > 0.02 * default.inertia.max()
 
 
-def test_a_lone_wheel_has_its_two_small_moments_raised_by_the_excess():
-    alone = {"name": "wheel", "root": "W", "convention": "orbiter"}
-    alone["vessels"] = {"W": {"mass": 1e6, "pmi": WHEEL}}
-    assert relative_error(reference.composite(scene(alone)).pmi, [26800.0, 26800.0, 52800.0]) < AGREEMENT
-    twin = Twin(scene(alone))
-    assert (
-        relative_error(np.array(twin.composite(twin.p_start)[3]).ravel(), [26800.0, 26800.0, 52800.0])
-        < AGREEMENT
-    )
-
-
 def test_it_is_never_the_default():
     assert parse_scene(ISS_DG).convention == "rigid_body"
     with pytest.raises(SceneError, match="no rigid body has these moments"):

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from supervessel.composite.constants import Places
-from supervessel.composite.docks import Joint, Way
+from supervessel.composite.docks import Joint, Way, alone_as_given, docks_of_root
 from supervessel.composite.inertia import Body, combine, orbiter_moments, placed_body, symmetric
 from supervessel.composite.poses import Pose, constant, from_anchor, mated_pose, port_axes, scaled
 from supervessel.composite.resolved import ResolvedScene, RigidGroup
@@ -301,13 +301,29 @@ def _port(scene: Scene, name: str, lookup: Lookup) -> tuple[ca.SX, ca.SX]:
     return position, port_axes(direction, alignment)
 
 
+def _moments(scene: Scene, name: str, lookup: Lookup, pmi: ca.SX) -> ca.SX:
+    """Returns a vessel's moments over mass, (3,) [m2], by the scene's convention; pmi : as they are given.
+
+    Orbiter takes six points where vessels are docked, and the moments of a vessel that is alone as they are.
+    Source: [EQ] Orbiter.
+    """
+    if scene.convention != "orbiter":
+        return pmi
+    if name != scene.root or not alone_as_given(scene):
+        return orbiter_moments(pmi)
+    closed = [lookup(f"{dock.name}.docked", 1.0) for dock in docks_of_root(scene)]
+    if not closed:
+        return pmi
+    return ca.if_else(sum(closed[1:], closed[0]) > 0.5, orbiter_moments(pmi), pmi)
+
+
 def vessel_body(scene: Scene, name: str, lookup: Lookup, pose: Pose) -> Body:
     """Returns a vessel as a body in the axes of its group."""
     vessel = scene.vessels[name]
     mass = lookup(f"{name}.mass", vessel.mass)
     if vessel.pmi is not None:
         pmi = lookup(f"{name}.pmi", vessel.pmi)
-        specific_inertia = ca.diag(orbiter_moments(pmi) if scene.convention == "orbiter" else pmi)
+        specific_inertia = ca.diag(_moments(scene, name, lookup, pmi))
     else:
         specific_inertia = constant(vessel.specific_inertia)
     centre = constant(from_anchor(scene, name, vessel.centre_of_mass))

@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from supervessel.composite.docks import Joint, VesselGroup
+from supervessel.composite.docks import Joint, VesselGroup, alone_as_given
 from supervessel.composite.inertia import combine_numbers, orbiter_moments, placed_body
 from supervessel.composite.poses import Pose, constant, from_anchor, mated_pose, port_axes, scaled
 from supervessel.scene.inputs import vessel_of
@@ -37,10 +37,12 @@ def places(scene: Scene, parts: Sequence[VesselGroup]) -> list[Places]:
 def constant_and_varying(scene: Scene, inside: Places) -> tuple[list[str], list[str]]:
     """Returns the names of a group's constant vessels, and of its varying ones, in the order of summation.
 
-    A vessel varies if its mass or its moments are inputs. The heaviest stand first; vessels whose mass is an
+    A vessel varies if its mass or its moments are inputs, or its moments differ while it is alone, see
+    `docks.alone_as_given`. The heaviest stand first; vessels whose mass is an
     input stand last; vessels whose mass is constant and zero are left out.
     """
     of_mass, of_moments = set(scene.inputs.mass), set(scene.inputs.pmi)
+    of_moments |= {scene.root} if alone_as_given(scene) else set()
     known = [name for name in inside if name not in of_mass and scene.vessels[name].mass > 0.0]
     known.sort(key=lambda name: -scene.vessels[name].mass)
     varying = [name for name in known if name in of_moments] + [name for name in inside if name in of_mass]

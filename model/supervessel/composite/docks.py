@@ -4,7 +4,8 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from supervessel.scene.inputs import part_of
+from supervessel.scene.inputs import part_of, vessel_of
+from supervessel.scene.numbers import triangle_problem
 from supervessel.scene.schema import Dock, Mount, Scene
 
 MOST_WAYS = 64
@@ -238,6 +239,31 @@ def _cut(parts: Sequence[VesselGroup], dock: Dock) -> _Cut | None:
 def switchable(scene: Scene, dock: Dock) -> bool:
     """Whether an input opens and closes a dock."""
     return dock.name is not None and dock.name in scene.inputs.docked
+
+
+def alone_as_given(scene: Scene) -> bool:
+    """Whether the root's moments differ, by Orbiter's convention, while nothing is docked to it.
+
+    Alone it has its moments as they stand, docked those of its six points: the same where a rigid body can
+    have them.
+    Source: [EQ] Orbiter.
+    """
+    pmi = scene.vessels[scene.root].pmi
+    if scene.convention != "orbiter" or pmi is None:
+        return False
+    same = scene.root not in scene.inputs.pmi and not triangle_problem(pmi)
+    return not same and may_be_alone(scene)
+
+
+def may_be_alone(scene: Scene) -> bool:
+    """Whether nothing is joined to the root, or nothing but by docks that inputs open."""
+    mounted = any(scene.root in (mount.parent, mount.child) for mount in scene.mounts)
+    return not mounted and all(switchable(scene, dock) for dock in docks_of_root(scene))
+
+
+def docks_of_root(scene: Scene) -> list[Dock]:
+    """Returns the docks that have a port of the root."""
+    return [dock for dock in scene.docks if scene.root in map(vessel_of, dock.ports)]
 
 
 def _neighbours(scene: Scene, docks: Sequence[Dock]) -> dict[str, list[Joint]]:

@@ -10,6 +10,7 @@ import casadi as ca
 
 from supervessel.composite.actions import action_parts, vessel_parts
 from supervessel.composite.bodies import composite_body, energy_of_motion, lookup_in
+from supervessel.composite.docks import alone_as_given
 from supervessel.composite.inertia import Body, ldl, ldl_inverse, upper_triangle
 from supervessel.composite.poses import anchor, constant
 from supervessel.composite.resolved import ResolvedScene
@@ -93,7 +94,8 @@ def composite_parts(resolved: ResolvedScene, p: ca.SX) -> dict[str, ca.SX]:
     velocity      : (3,) [m/s], where ports move and outputs need it: velocity of the barycentre relative to
                     the root vessel's axes, body axes
     lightness     : (1,) [1/(kg m2)], where there are wheels: trace((J - A)^-1)
-    excess        : (1,), where there are wheels, see `growth_excess`
+    excess        : (1,), where moments may be those of no rigid body, see `growth_excess`: where there are
+                    wheels, or the root has its own moments alone, see `docks.alone_as_given`
     moving        : (1,) [J], where the output total_kinetic_energy is asked for: kinetic energy of parts that
                     move relative to body axes, without what wheels would have of it if they were locked
     wheels, wheel_rates : see `composite.wheels.wheel_parts`
@@ -136,6 +138,7 @@ def body_parts(scene: Scene, body: Body, wheels: WheelAxes | None = None) -> dic
         bound = ca.SX(0.0) if may_be_point else ca.trace(ldl_inverse(lower, pivots))
     if wheels is not None:
         parts["lightness"] = bound
+    if wheels is not None or alone_as_given(scene):
         parts["excess"] = growth_excess(LAWS[law], turning)
     if body.spin is not None:
         parts["momentum"] = ca.vertcat(body.spin, ca.sumsqr(body.spin) * bound * bound)

@@ -338,7 +338,7 @@ def composite(scene: Scene, values: Mapping[str, float] | None = None) -> Compos
 
     values : inputs by the FMU's structured names that differ from the scene's, `{"DG.mass": 12000.0}`
     Source: [CV] eqs. (10), (11), with the products of inertia that the note leaves out; by the convention
-    "orbiter" without.
+    "orbiter" without, and the moments of a root that nothing is joined to are as they are given.
 
     Example:
         >>> round(reference.composite(scene, {"DG.mass": 12000.0}).mass, 3)
@@ -350,6 +350,9 @@ def composite(scene: Scene, values: Mapping[str, float] | None = None) -> Compos
     inertia = np.trace(second_moments) * np.eye(3) - second_moments
     if scene.convention == "orbiter":
         inertia = np.diag(np.diag(inertia))
+        own = scene.vessels[scene.root].pmi
+        if own is not None and len(motions(scene, values)) == 1:
+            inertia = m.sum() * np.diag(vector(f"{scene.root}.pmi", own, values))
     return Composite(float(m.sum()), whole.barycentre, inertia)
 
 

@@ -179,7 +179,8 @@ def total_kinetic_energy(scene: Scene, state: ArrayLike, values: Mapping[str, fl
     """Returns the kinetic energy relative to the barycentre, [J]: of all sample points, and of wheels.
 
     state : (attitude, angular velocity, momenta of wheels), (7 + n,)
-    A wheel turns with its vessel among the points. That part is replaced by h^2/(2 I), or 0 where I is 0.
+    A wheel turns with its vessel among the points. That part is replaced by h^2/(2 I), or 0 where I is 0. By
+    the convention "orbiter" that of the whole, turning, is by the composite's tensor, not that of its points.
 
     Example:
         >>> round(reference.total_kinetic_energy(scene, [1, 0, 0, 0, 0, 0.0011, 0]))
@@ -192,6 +193,10 @@ def total_kinetic_energy(scene: Scene, state: ArrayLike, values: Mapping[str, fl
     energy = 0.5 * whole.masses @ (v * v).sum(axis=1)
     rates = own.axes @ state[4:7] + own.rates
     heavy = (own.inertias > 0.0) & np.any(own.axes != 0.0, axis=1)
+    if scene.convention == "orbiter":
+        turning = np.cross(state[4:7], whole.positions - whole.barycentre)
+        by_points = whole.masses @ (turning * turning).sum(axis=1)
+        energy += 0.5 * (state[4:7] @ composite(scene, values).inertia @ state[4:7] - by_points)
     energy += 0.5 * (own.momenta[heavy] ** 2 / own.inertias[heavy]).sum() - 0.5 * own.inertias @ rates**2
     return float(energy)
 
@@ -239,6 +244,8 @@ def vessel_outputs_after(
         rho = part.positions - barycentre
         v = np.cross(omega, rho) + part.velocities - drift
         momentum = part.masses @ np.cross(rho, v) + _stored_beside(scene, vessel, own_wheels, omega)
+        if scene.convention == "orbiter" and len(found) == 1:  # its own moments, not those of its points
+            momentum = composite(scene, values).inertia @ omega
         outputs |= {
             f"{vessel}.origin": motion.origin - barycentre,
             f"{vessel}.centre_of_mass": motion.carry(np.array(table.centre_of_mass))[0] - barycentre,

@@ -28,14 +28,12 @@ class SpunWheels:
     motors    : torque u_w of each wheel's motor, (n,) [N m]
     rate      : h_w' of each wheel, (n,) [N m]
     lightness : trace((J - A)^-1) [1/(kg m2)]
-    excess    : by how much d|omega|/dt over |omega|^2 may exceed the law's `growth`, see `composite.parts`
     """
 
     axes: WheelAxes
     motors: ca.SX
     rate: ca.SX
     lightness: ca.SX
-    excess: ca.SX
 
     @property
     def reaction(self) -> ca.SX:
@@ -67,6 +65,8 @@ class Dynamics:
     spin_square : [rad2/s2], square of a bound of |J^-1 (omega x h)|/|omega|; None where spin is None
     wheels      : None where there are none
     field       : the field of gravity whose gradient is a torque too; None where there is none
+    excess      : by how much d|omega|/dt over |omega|^2 may exceed the law's `growth`; None: a rigid body's
+                  moments never let it, see `composite.parts`
     """
 
     law: RotationLaw
@@ -78,6 +78,7 @@ class Dynamics:
     spin_square: ca.SX | None
     wheels: SpunWheels | None = None
     field: Field | None = None
+    excess: ca.SX | None = None
 
     @property
     def turning(self) -> ca.SX:
@@ -178,6 +179,7 @@ def dynamics_of(resolved: ResolvedScene, parts: Mapping[str, ca.SX], u: ca.SX) -
         spin_square=parts["momentum"][3] if spins else None,
         wheels=_wheels(resolved, parts, u),
         field=field_of(resolved, parts, u),
+        excess=parts.get("excess"),
     )
 
 
@@ -187,4 +189,4 @@ def _wheels(resolved: ResolvedScene, parts: Mapping[str, ca.SX], u: ca.SX) -> Sp
     if axes is None:
         return None
     motors = motor_torques(resolved, u)
-    return SpunWheels(axes, motors, stored_rate(resolved, axes, motors), parts["lightness"], parts["excess"])
+    return SpunWheels(axes, motors, stored_rate(resolved, axes, motors), parts["lightness"])

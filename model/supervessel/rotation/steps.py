@@ -138,8 +138,8 @@ def _fastest_square(
     if field is not None:
         pushed = by_torque + field.largest_acceleration(motion.law, motion.numbers)
     square = fastest_square(omega, pushed, motion.law.growth, angle, held)
-    if dynamics.wheels is not None:
-        square = square * stretched(dynamics.wheels.excess, angle)
+    if dynamics.excess is not None:
+        square = square * stretched(dynamics.excess, angle)
     if field is None:
         return square
     orbit = field.orbit_rate()

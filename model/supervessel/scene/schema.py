@@ -348,8 +348,8 @@ class Scene(Table):
     Description, version, author, copyright and license are what the FMU says of itself as a model, word for
     word; None: nothing, of the description a line that names vessels and law.
     Under the convention "orbiter" the composite is that of the Orbiter simulator, for comparison: moments
-    that no rigid body has are taken by the absolute values of [CV] eqs. (3-5), and of the composite's tensor
-    the diagonal alone is kept.
+    that no rigid body has are taken by the absolute values of [CV] eqs. (3-5), but for a root that nothing is
+    joined to, and of the composite's tensor the diagonal alone is kept.
 
     Example:
         >>> scene.vessels["DG"].mass

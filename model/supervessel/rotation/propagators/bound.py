@@ -35,11 +35,12 @@ def fastest_square(
 
 
 def stretched(excess: ca.SX, angle: float) -> ca.SX:
-    """Returns by what `fastest_square` of a spin is to be multiplied where g is larger than `growth`.
+    """Returns by what `fastest_square` is to be multiplied where g is larger than `growth`.
 
     excess : by how much, at least 0
     angle  : s, [rad]
-    With a spin, d(w^2)/ds <= (2 g + 1) w^2 + b^2 + 2 a. With an excess d let the bound be the rate at the end
+    With a spin, d(w^2)/ds <= (2 g + 1) w^2 + b^2 + 2 a; without one, 2 g takes the place of 2 g + 1, and b is
+    0. With an excess d let the bound be the rate at the end
     of the angle s/m alone, m = 1 + 2 d s, and m times that: so the step stays as short. Since 2 d s/m is at
     most log m, and at most 1, e is then at most m times, and at most exp(1) times, what it is at s without
     the excess, and f is no larger.

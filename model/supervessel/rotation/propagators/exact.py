@@ -16,14 +16,16 @@ STATE_SIZE = 7
 SHORT = 2.0**-5
 """Angle [rad] up to which `free_step` is a series of order SHORT_ORDER.
 
-The closed form's turn is known to some u; over the angle, so are its derivatives by the rates.
+The closed form's turn is known to some u; over the angle, so are its derivatives by the rates. Where the
+largest factor of Euler's equations, see `principal_products`, is above 1, as no rigid body has it, the angle
+is less by that factor.
 """
 
 SHORT_ORDER = 10
 """Highest power of the time in that series.
 
-In a rigid body its terms fall at least as those of 1/(1 - SHORT), so that what is left out of derivatives is
-below 12 SHORT^11 = 2^-51 of them.
+Its terms fall at least as those of 1/(1 - SHORT), so that what is left out of derivatives is below
+12 SHORT^11 = 2^-51 of them.
 """
 
 
@@ -90,7 +92,8 @@ def free_step(state: ca.SX, moments: ca.SX, R_body_principal: ca.SX, time: ca.SX
                        by more than LARGEST_TURN
     """
     omega = R_body_principal.T @ state[4:]
-    is_short = ca.sumsqr(omega * time) <= SHORT**2
+    factor = ca.fmax(1.0, ca.mmax(ca.fabs(principal_products(moments))))
+    is_short = ca.sumsqr(omega * (factor * time)) <= SHORT**2
     short = short_step(state, moments, R_body_principal, ca.if_else(is_short, time, 0.0))
     fastest = ca.if_else(is_short, 1.0, ca.mmax(ca.fabs(omega)))
     moving, span = ca.if_else(is_short, ca.SX([0.5, 0.75, 0.625]), omega / fastest), time * fastest
