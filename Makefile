@@ -14,7 +14,7 @@ LOWEST := tests/model tests/orbiter tests/build/test_build.py tests/build/test_s
   tests/twin/test_twin.py tests/twin/test_twin_reference.py tests/twin/test_error_state.py tests/trade/test_trade.py \
   tests/examples/test_lqr_hold.py tests/examples/test_identify.py
 
-.PHONY: run test check lowest constraints platforms robustness stability accuracy surroundings bench compatibility slews peers importers clean
+.PHONY: run test check lowest constraints platforms robustness stability accuracy surroundings thorough bench compatibility slews peers importers clean
 
 run: .venv/installed
 	$(BIN)/python -m fmu_build examples/iss_dg.toml -o build/iss_dg.fmu
@@ -53,6 +53,9 @@ constraints:
 platforms: .venv/installed-dev
 	$(BIN)/python -m pytest -m platforms tests/platforms
 
+# Libraries as users get them, where `make test` has those that are compiled without optimisation.
+stability accuracy thorough: export SUPERVESSEL_TESTS_THOROUGH = 1
+
 robustness: .venv/installed-dev
 	$(BIN)/python -m pytest -m robustness tests/robustness
 
@@ -68,6 +71,11 @@ accuracy: .venv/installed-dev
 
 surroundings: .venv/installed-dev
 	$(BIN)/python -m pytest -n auto -m surroundings tests
+
+# All that `make test` runs, on libraries as users get them, and more cases of it.
+thorough: .venv/installed-dev
+	$(BIN)/python -m pytest -n auto --dist worksteal \
+	  -m "not (platforms or robustness or stability or accuracy or surroundings or importers)" tests
 
 bench: .venv/installed-dev
 	$(BIN)/python tests/bench/run.py

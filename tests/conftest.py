@@ -4,7 +4,11 @@ import os
 import tempfile
 from pathlib import Path
 
+import pytest
+
+from fmu_build.compile import native
 from fmu_build.storage.compiler_files import compiler_folder
+from support.fmus import session_flags
 from support.processes import warm
 
 
@@ -20,3 +24,11 @@ def pytest_configure(config):
         warm()
         os.environ["ZIG_GLOBAL_CACHE_DIR"] = str(compiler_folder())
         os.environ["ZIG_LOCAL_CACHE_DIR"] = str(Path(folder.name, "zig"))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def quickly_compiled():
+    """Has a twin's C compiled as tests' FMUs are: see `support.fmus.THOROUGH`."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(native, "FLAGS", session_flags())
+        yield

@@ -43,6 +43,7 @@ def _above(c: Confirmed) -> float:
     return max(c.attitude.values()) / c.evidence["attitude"]
 
 
+@pytest.mark.accuracy
 def test_the_fmu_of_a_random_scene_keeps_what_is_claimed():
     found = one(5)
     assert found.refused is None

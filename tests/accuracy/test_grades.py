@@ -93,7 +93,7 @@ def test_a_law_that_fails_in_a_small_part_of_the_ranges_is_not_proven(case: Any)
 @pytest.mark.parametrize(
     ("case", "moved"),
     [
-        (by_mass, ("T.mass",)),
+        pytest.param(by_mass, ("T.mass",), marks=pytest.mark.accuracy),
         pytest.param(by_position, ("R.a.position", ""), marks=pytest.mark.accuracy),
         pytest.param(by_docks, DOCKS, marks=pytest.mark.accuracy),
     ],
@@ -127,6 +127,7 @@ def asked(attitude: float) -> dict[str, Any]:
     }
 
 
+@pytest.mark.accuracy
 def test_slow_flight_is_proven_and_says_so() -> None:
     """A cheap law where little is asked, the full one where more is; each bounded within what is asked."""
     cheap, exact = (choose(parse_scene(asked(attitude)))[1] for attitude in (0.1, 1e-8))

@@ -33,6 +33,7 @@ def row(attitude):
     return f"| {' | '.join(cells)} |"
 
 
+@pytest.mark.accuracy
 def test_the_line_is_what_the_scene_gives():
     block = re.search(r"```text\n(.*?)\n```", SECTION, re.DOTALL)
     assert block is not None

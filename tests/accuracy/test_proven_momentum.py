@@ -16,6 +16,7 @@ from fmu_build.flight.choices import Choice, Model
 from supervessel import Scene, Twin, parse_scene, reference
 from supervessel.equations import equations
 from supervessel.scene.schema import Accuracy
+from support.marks import some_at_once
 
 Array = NDArray[np.float64]
 
@@ -158,7 +159,10 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("law", "kept", "moves"), CASES)
+@pytest.mark.parametrize(
+    ("law", "kept", "moves"),
+    some_at_once(CASES, ("decoupled", "momentum", False), ("tensor", "momentum", True)),
+)
 def test_no_flight_passes_the_bound(law: str, kept: str, moves: bool) -> None:
     """[EB] eqs. (35) to (42): masses, poses, motion of ports and torque jump at every step, or are held."""
     seed = len(law) + moves

@@ -111,6 +111,7 @@ def examined(seeds: range) -> str:
     return "\n".join(lines)
 
 
+@pytest.mark.accuracy
 def test_bounds_of_some_random_scenes_hold() -> None:
     print(examined(range(6)))
 

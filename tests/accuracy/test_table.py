@@ -118,6 +118,7 @@ def command(limit=""):
 
 
 @needs_posix
+@pytest.mark.thorough
 def test_an_interrupt_keeps_whole_results_and_leaves_no_fmu(tmp_path, cache):
     (tmp_path / "ball.toml").write_text(BALL + ACCURACY_ASKED)
     done, kept = interrupted(command(), tmp_path, cache, "accuracy")

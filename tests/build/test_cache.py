@@ -28,7 +28,8 @@ from fmu_build.storage.compiler_files import FOLDER, RECORD
 from fmu_build.storage.temporary import temporary_folder
 from supervessel.__main__ import main
 from support import body, scene
-from support.processes import ROOT, needs_posix
+from support.marks import some_at_once
+from support.processes import ROOT, begin_cache, needs_posix
 
 SCENE = 'name = "ball"\nroot = "B"\n[vessels.B]\nmass = 2.0\npmi = [1.0, 1.5, 2.0]\n'
 
@@ -444,7 +445,7 @@ STRANGE = {
 
 
 @needs_posix
-@pytest.mark.parametrize("name", STRANGE.values(), ids=STRANGE)
+@pytest.mark.parametrize("name", some_at_once(STRANGE, "percent", "no UTF-8", "long"))
 def test_a_temporary_folder_of_any_name_works_or_is_refused_by_name(tmp_path, name):
     work, folder = tmp_path / "work", tmp_path / os.fsdecode(name)
     work.mkdir()
@@ -508,12 +509,19 @@ def test_the_name_of_an_answer_is_all_of_the_question(generation):
 
 
 @pytest.fixture
-def compiled(generation):
-    """Compiles a body's library in a cache that is new."""
+def compiled_cold(generation):
+    """Compiles a body's library in a cache that is new, with all that the compiler makes for itself."""
     raw = scene(body())
     packed = source_files(generate(raw, 3)[0], 3, raw.name)
     names = source_file_names(generate(raw, 3)[0], 3)
     return lambda: compile_sources(packed, names, 3, [host_platform()], raw.name, TRIAL_FLAGS)
+
+
+@pytest.fixture
+def compiled(base, compiled_cold):
+    """The same where the compiler's own files are there."""
+    begin_cache(base)
+    return compiled_cold
 
 
 def test_a_library_that_has_been_damaged_is_compiled_anew(generation, compiled):
@@ -537,6 +545,7 @@ def test_what_the_compiler_has_kept_for_itself_is_not_believed_where_it_has_chan
     first = compiled()
     shutil.rmtree(generation / "libraries")
     [libm] = (generation / FOLDER).rglob("libm.so.6")
+    libm.unlink()  # other caches have links to its content
     libm.write_bytes(b"")
     assert compiler_files.is_changed(generation / FOLDER)
     compiler_files._was_changed.cache_clear()  # as in a program that begins
@@ -594,20 +603,21 @@ def test_a_compiler_is_known_to_be_at_work_though_another_asks_as_it_begins(gene
 
 
 @needs_posix
-@pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
+@pytest.mark.parametrize("number", some_at_once([errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP], errno.ENOLCK))
 def test_where_a_file_system_has_no_locks_the_compilers_files_are_recorded_and_a_cache_cleared(
-    generation, compiled, monkeypatch, capsys, number
+    generation, compiled_cold, monkeypatch, capsys, number
 ):
     def no_locks(file, kind):
         raise OSError(number, os.strerror(number))
 
     monkeypatch.setattr(temporary.fcntl, "flock", no_locks)
-    compiled()
+    compiled_cold()
     assert (generation / RECORD).exists()
     assert main(["cache", "--clear"]) == 0
     assert capsys.readouterr().out.startswith("removed: ")
 
 
+@pytest.mark.thorough
 def test_a_compiler_whose_manifests_lead_nowhere_is_started_again_with_new_files(generation, compiled):
     """Its files are as recorded, but a manifest names others: it fails, and not because of our sources."""
     first = compiled()

@@ -188,6 +188,7 @@ def test_a_folder_that_holds_something_is_left_alone(folder, capsys):
     assert [path.name for path in place.iterdir()] == ["note"]
 
 
+@pytest.mark.thorough
 def test_a_link_to_an_empty_folder_is_followed(tmp_path):
     (tmp_path / "ball.toml").write_text(BALL)
     (tmp_path / "empty").mkdir()

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from fmu_build import BuildError
-from fmu_build.compile.compiler import compile_library
+from fmu_build.compile.compiler import TRIAL_FLAGS, compile_library
 from fmu_build.platforms import host_platform
 from fmu_build.storage.cache import cache_folder
 from fmu_build.storage.compiler_files import compiler_folder
@@ -73,7 +73,7 @@ def test_a_compiler_finds_the_real_headers_and_libraries(tmp_path, monkeypatch, 
     source.write_text(f"/* {tmp_path} */\n#include <math.h>\ndouble root(double x) {{ return sqrt(x); }}\n")
     monkeypatch.setenv(name, "+-Dsqrt(x)=7.0" if name == "CCC_OVERRIDE_OPTIONS" else str(doctored))
     library = tmp_path / f"root{host_platform().suffix}"
-    compile_library([source], host_platform(), library, ("-O0", "-fPIC", "-shared"))
+    compile_library([source], host_platform(), library, (*TRIAL_FLAGS, "-fvisibility=default"))
     root = ctypes.CDLL(str(library)).root
     root.restype, root.argtypes = ctypes.c_double, [ctypes.c_double]
     assert root(9.0) == 3.0
@@ -99,7 +99,9 @@ def planted(folder: Path, names: tuple[str, ...]) -> Path:
 @pytest.mark.parametrize(
     ("words", "names"),
     [
-        (["-P", "-m", "supervessel", "trade", "ball.toml", "--quick"], PLANTED),
+        pytest.param(
+            ["-P", "-m", "supervessel", "trade", "ball.toml", "--quick"], PLANTED, marks=pytest.mark.thorough
+        ),
         (["-P", "-m", "fmu_build", "ball.toml"], PLANTED),
         (["-m", "fmu_build", "ball.toml"], ("ziglang", "fmpy")),
     ],

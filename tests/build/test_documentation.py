@@ -21,7 +21,7 @@ from supervessel import parse_scene
 from supervessel.equations import equations
 from supervessel.scene.schema import PROPAGATOR_NAMES, Law
 from support import ISS_DG, body, variant
-from support.marks import FMI
+from support.marks import FMI, FMI_3_AT_ONCE
 from support.orbits import orbiting
 
 VOID = {"meta", "br", "hr", "img", "link", "input"}
@@ -116,7 +116,7 @@ def checked(html):
     return parser
 
 
-@FMI
+@FMI_3_AT_ONCE
 @pytest.mark.parametrize("name", SCENES)
 def test_the_page_is_well_formed(name, fmi):
     html = made(name, fmi)[2][INDEX]

@@ -18,6 +18,7 @@ from supervessel import Scene, Twin, parse_scene
 from supervessel.equations import Equations, equations, p_start
 from support import EPS, ISS_DG, OK, flying, scene, store, variant
 from support.costs import station
+from support.marks import some_at_once
 
 VISIBLE = [flag for flag in FLAGS if flag not in ("-fvisibility=hidden", "-s")]
 COUNT = 16
@@ -87,7 +88,7 @@ def compiled_for(name: str) -> Compiled:
     return Compiled(parse_scene(SCENES[name]), Path(tempfile.mkdtemp(dir=store())))
 
 
-@pytest.fixture(scope="module", params=SCENES)
+@pytest.fixture(scope="module", params=some_at_once(SCENES.keys(), "everything", "in Orbiter's convention"))
 def both(request) -> tuple[Compiled, Equations, np.ndarray]:
     """The loop, the straight code, and values of the inputs that are off the scene's."""
     scene = parse_scene(SCENES[request.param])
@@ -105,6 +106,7 @@ def test_the_loop_gives_the_bits_of_the_straight_code(both):
     np.testing.assert_array_equal(compiled("composite", p, size=len(truth)), truth)
 
 
+@pytest.mark.thorough
 def test_one_vessel_at_a_time_gives_the_same_bits(tmp_path):
     """As compilers without registers of several numbers take them."""
     scene = parse_scene(every_kind())

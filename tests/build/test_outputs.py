@@ -14,6 +14,7 @@ from fmu_build import BuildError, build, build_fmu
 from orbiter.files import Files
 from supervessel import Twin, commands, load_scene
 from support import BALL, processes
+from support.marks import some_at_once
 from support.processes import cache, needs_posix
 
 __all__ = ["cache"]
@@ -99,7 +100,9 @@ def assert_refused(command, folder, cache, why, *more):
 
 
 @needs_posix
-@pytest.mark.parametrize("kind", ["a folder", "a named pipe", "a character device"])
+@pytest.mark.parametrize(
+    "kind", some_at_once(["a folder", "a named pipe", "a character device"], "a named pipe")
+)
 def test_what_is_no_regular_file_is_refused_with_its_kind(command, folder, cache, kind):
     output = folder / command.output
     if kind == "a folder":
@@ -153,7 +156,7 @@ def test_a_read_only_file_is_refused(command, folder, cache):
     )
 
 
-@pytest.mark.parametrize("how", ["hard link", "link"])
+@pytest.mark.parametrize("how", some_at_once(["hard link", "link"], "link"))
 def test_an_input_by_another_name_is_refused(command, folder, cache, how):
     output = folder / command.output
     if how == "link":
@@ -178,7 +181,9 @@ WHY = {
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-@pytest.mark.parametrize("content", [b"my thesis", b"PK\x05\x06" + bytes(18)], ids=["text", "empty archive"])
+@pytest.mark.parametrize(
+    "content", some_at_once({"text": b"my thesis", "empty archive": b"PK\x05\x06" + bytes(18)}, "text")
+)
 def test_a_file_of_another_kind_is_never_replaced(folder, cache, name, content):
     command = COMMANDS[name]
     (folder / command.output).write_bytes(content)
@@ -207,6 +212,7 @@ def test_a_json_of_another_in_place_of_a_trades_is_never_replaced(folder, cache)
     assert_refused(command, folder, cache, WHY["trade"])
 
 
+@pytest.mark.thorough
 def test_a_trade_leaves_other_files_of_its_folder_alone(folder, cache):
     (folder / "out" / "notes.md").write_text("mine")
     assert run(COMMANDS["trade"], folder, cache).returncode == 0

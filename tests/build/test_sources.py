@@ -25,7 +25,7 @@ from fmu_build.storage.cache import cache_folder
 from supervessel.rotation.propagators import PROPAGATORS
 from support import ISS_DG, OK, STEADY, Instance, body, built, scene, variant
 from support.costs import station
-from support.marks import FMI
+from support.marks import FMI, FMI_3_AT_ONCE
 from support.orbits import EARTH, ORBIT
 from wheels.scenes import CARRIER
 
@@ -225,9 +225,9 @@ def test_fmi_2_lists_its_source_files_in_the_model_description():
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-@FMI
+@FMI_3_AT_ONCE
 def test_the_sources_compile_to_a_library_with_bit_identical_results(tmp_path, fmi, compiler):
-    fmpy.extract(str(built(ISS_DG, fmi)), unzipdir=str(tmp_path))
+    fmpy.extract(str(built(ISS_DG, fmi, optimised=True)), unzipdir=str(tmp_path))
     expected = flight(tmp_path)
     compiled(tmp_path, fmi, COMPILERS[compiler])
     assert len(expected) == STEPS + 1
@@ -340,7 +340,7 @@ def test_the_sources_of_fmus_of_both_versions_are_linked_into_one_program_and_fl
         instance.free()
 
 
-@FMI
+@FMI_3_AT_ONCE
 def test_fmpy_compiles_the_sources_to_a_library_that_it_flies(tmp_path, fmi):
     """As `fmpy compile` does: FMPy passes what buildDescription.xml lists, and nothing else on Linux."""
     if shutil.which("cmake") is None:
@@ -355,7 +355,7 @@ def test_fmpy_compiles_the_sources_to_a_library_that_it_flies(tmp_path, fmi):
     assert flight(tmp_path).tobytes() == expected.tobytes()
 
 
-@FMI
+@FMI_3_AT_ONCE
 def test_a_shared_library_made_of_the_sources_has_the_plain_names(tmp_path, fmi):
     """The macro is that of the standard's headers (FMI 2.0.4: 2.1.1)."""
     fmpy.extract(str(built(ISS_DG, fmi)), unzipdir=str(tmp_path))

@@ -16,6 +16,7 @@ from orbiter.files import Files
 from supervessel import SceneError, load_scene, parse_scene
 from supervessel.problems import LONGEST_PROBLEM, LONGEST_WORD, UNSEEN, printable
 from support import BALL, ISS_DG, variant
+from support.marks import some_at_once
 from support.processes import ROOT
 
 HOSTILE = {
@@ -203,7 +204,7 @@ needs_bytes = pytest.mark.skipif(sys.platform != "linux", reason="needs file nam
 
 @needs_bytes
 @pytest.mark.parametrize("environment", ENVIRONMENTS.values(), ids=ENVIRONMENTS)
-@pytest.mark.parametrize("module", ["fmu_build", "supervessel"])
+@pytest.mark.parametrize("module", some_at_once(["fmu_build", "supervessel"], "supervessel"))
 def test_commands_name_any_file_in_any_locale_in_a_line(tmp_path, module, environment):
     name = b"\xff\x1b[31m\xe2\x80\xae\n\xc3\xbc"
     (tmp_path / os.fsdecode(name)).write_text(BALL.replace("2.0", "-2.0", 1) + '"\\u202eü" = 1\n')

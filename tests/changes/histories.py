@@ -258,7 +258,7 @@ class ByReference:
 class ByFmu:
     """The FMU in co-simulation."""
 
-    def __init__(self, raw: Mapping[str, Any], fmi: int = 3, *, optimised: bool = True) -> None:
+    def __init__(self, raw: Mapping[str, Any], fmi: int = 3, *, optimised: bool | None = None) -> None:
         self.instance = Instance(raw, fmi, optimised=optimised)
         assert self.instance.initialise() == OK, self.instance.log
 

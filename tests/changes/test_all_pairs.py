@@ -6,11 +6,16 @@ import pytest
 from changes.pairs import OF_VESSELS, SCENES, SHOWN, Found, Place, everywhere
 from changes.scenes import TUG, TUG_EVENTS
 from support import EPS, OK, Instance, variant
+from support.marks import some_at_once
 
 
 @pytest.mark.parametrize(
     ("name", "fmi"),
-    [*((name, 3) for name in SCENES), *((name, 2) for name in ("mixed", "momentum", "no docks"))],
+    some_at_once(
+        [*((name, 3) for name in SCENES), *((name, 2) for name in ("mixed", "momentum", "no docks"))],
+        ("mixed", 3),
+        ("no docks", 2),
+    ),
 )
 def test_derivatives_are_differences_of_what_is_read_and_all_that_counts_is_declared(name, fmi):
     assert everywhere(SCENES[name], fmi).problems == []

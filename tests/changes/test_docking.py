@@ -3,12 +3,13 @@
 import hypothesis.strategies as st
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import given
 
 from changes.histories import ByExchange, ByFmu, ByTwin, Driver, Values, elements
 from changes.scenes import MIR
 from supervessel import reference
 from support import EPS, OK, Instance, refusal, scene
+from support.examples import examples
 from support.marks import FMI
 
 MIR_RATE = np.array(MIR["rotation"]["angular_velocity"])
@@ -30,7 +31,7 @@ RATE_ERROR = 1e-12
 
 
 @pytest.mark.parametrize("driver", [ByFmu, ByExchange, ByTwin])
-@settings(deadline=None, derandomize=True, max_examples=40, phases=(Phase.explicit, Phase.generate))
+@examples(15, 40)
 @given(approach=approaches())
 def test_a_ship_docks_with_the_right_rates(driver, approach):
     flown: Driver = driver(MIR)
@@ -40,7 +41,7 @@ def test_a_ship_docks_with_the_right_rates(driver, approach):
     assert np.abs(flown.angular_velocity - truth).max() <= RATE_ERROR * scale
 
 
-@settings(deadline=None, derandomize=True, max_examples=40, phases=(Phase.explicit, Phase.generate))
+@examples(15, 40)
 @given(approach=approaches())
 def test_docking_never_raises_the_kinetic_energy(approach):
     flown = scene(MIR)

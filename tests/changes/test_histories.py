@@ -6,7 +6,7 @@ from typing import Any
 import hypothesis.strategies as st
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import given
 
 from changes.histories import (
     EVENTS,
@@ -25,6 +25,7 @@ from changes.histories import (
 )
 from supervessel import reference
 from support import U, scene
+from support.examples import examples
 from support.marks import FMI
 
 BOOKS = 64 * U
@@ -68,7 +69,7 @@ def follow(raw: dict[str, Any], driver: Driver, history: list[tuple[list[str], i
 
 
 @pytest.mark.parametrize("kept", KEPT, ids=" ".join)
-@settings(deadline=None, derandomize=True, max_examples=10, phases=(Phase.explicit, Phase.generate))
+@examples(3, 10)
 @given(seed=st.integers(0, 10**6), count=st.integers(2, 20), history=HISTORIES)
 def test_the_reference_balances_momentum_over_random_histories(kept, seed, count, history):
     raw = assembly(seed, count, mass_change=kept[0], pose_change=kept[1])
@@ -76,7 +77,7 @@ def test_the_reference_balances_momentum_over_random_histories(kept, seed, count
 
 
 @pytest.mark.parametrize("count", [3, 20])
-@settings(deadline=None, derandomize=True, max_examples=10, phases=(Phase.explicit, Phase.generate))
+@examples(3, 10)
 @given(history=HISTORIES)
 def test_the_fmu_balances_momentum_over_random_histories(count, history):
     raw = assembly(count, count, mass_change="rate", pose_change="momentum")
@@ -88,7 +89,7 @@ def test_the_fmu_balances_momentum_over_random_histories(count, history):
 @pytest.mark.parametrize("driver", [ByFmu, ByExchange])
 @FMI
 @pytest.mark.parametrize("kept", KEPT, ids=" ".join)
-@settings(deadline=None, derandomize=True, max_examples=5, phases=(Phase.explicit, Phase.generate))
+@examples(3, 5)
 @given(history=HISTORIES)
 def test_both_interfaces_of_the_fmu_balance_momentum_over_random_histories(kept, fmi, driver, history):
     raw = assembly(3, 3, mass_change=kept[0], pose_change=kept[1])
@@ -99,7 +100,7 @@ def test_both_interfaces_of_the_fmu_balance_momentum_over_random_histories(kept,
 
 @pytest.mark.parametrize("count", [3, 20])
 @pytest.mark.parametrize("kept", KEPT, ids=" ".join)
-@settings(deadline=None, derandomize=True, max_examples=5, phases=(Phase.explicit, Phase.generate))
+@examples(3, 5)
 @given(history=HISTORIES)
 def test_the_twin_balances_momentum_over_random_histories(kept, count, history):
     raw = assembly(count, count, mass_change=kept[0], pose_change=kept[1])
@@ -107,7 +108,7 @@ def test_the_twin_balances_momentum_over_random_histories(kept, count, history):
 
 
 @pytest.mark.parametrize("kept", KEPT, ids=" ".join)
-@settings(deadline=None, derandomize=True, max_examples=8, phases=(Phase.explicit, Phase.generate))
+@examples(3, 8)
 @given(seed=st.integers(0, 10**6), count=st.integers(2, 8), history=WHEEL_HISTORIES)
 def test_the_reference_balances_momentum_with_wheels(kept, seed, count, history):
     raw = assembly(seed, count, wheels=True, mass_change=kept[0], pose_change=kept[1])
@@ -115,7 +116,7 @@ def test_the_reference_balances_momentum_with_wheels(kept, seed, count, history)
 
 
 @pytest.mark.parametrize("kept", KEPT, ids=" ".join)
-@settings(deadline=None, derandomize=True, max_examples=8, phases=(Phase.explicit, Phase.generate))
+@examples(3, 8)
 @given(history=WHEEL_HISTORIES)
 def test_the_twin_balances_momentum_with_wheels(kept, history):
     raw = assembly(7, 3, wheels=True, mass_change=kept[0], pose_change=kept[1])
@@ -123,7 +124,7 @@ def test_the_twin_balances_momentum_with_wheels(kept, history):
 
 
 @pytest.mark.parametrize("driver", [ByFmu, ByExchange])
-@settings(deadline=None, derandomize=True, max_examples=8, phases=(Phase.explicit, Phase.generate))
+@examples(3, 8)
 @given(history=WHEEL_HISTORIES)
 def test_both_interfaces_of_the_fmu_balance_momentum_with_wheels(driver, history):
     raw = assembly(7, 3, wheels=True, mass_change="momentum", pose_change="momentum")

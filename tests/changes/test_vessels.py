@@ -5,12 +5,13 @@ from typing import Any
 import hypothesis.strategies as st
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import given
 
 from changes.histories import Values, assembly, elements, happening, start_values
 from supervessel import Scene, Twin, reference
 from supervessel.scene.outputs import VESSEL_OUTPUTS
 from support import EPS, OK, flying, scene, variant
+from support.examples import examples
 
 AGREEMENT = 1000 * EPS
 """Of the largest number of an output's kind: poses go down a chain of up to five vessels, each of a few dozen
@@ -54,7 +55,7 @@ def twins_outputs(flown: Scene, x: np.ndarray, values: Values) -> dict[str, np.n
     return {name: np.array(values) for name, values in found.items()}
 
 
-@settings(deadline=None, derandomize=True, max_examples=20, phases=(Phase.explicit, Phase.generate))
+@examples(8, 20)
 @given(seed=st.integers(0, 10**6), count=st.integers(2, 7))
 def test_outputs_of_vessels_are_the_references(seed, count):
     flown = scene(shown(seed, count))
@@ -99,7 +100,7 @@ def test_the_fmu_shows_a_vessel_while_it_is_docked():
             assert attitude.any() == truth.any()
 
 
-@settings(deadline=None, derandomize=True, max_examples=20, phases=(Phase.explicit, Phase.generate))
+@examples(8, 20)
 @given(seed=st.integers(0, 10**6), count=st.integers(2, 7), wheels=st.booleans())
 def test_the_whole_energy_is_that_of_all_points_and_wheels(seed, count, wheels):
     flown = scene(variant(assembly(seed, count, wheels=wheels), {"outputs.names": ["total_kinetic_energy"]}))

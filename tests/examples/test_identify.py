@@ -46,6 +46,7 @@ def test_the_example_prints_what_the_page_says(tmp_path, capsys):
     assert (tmp_path / "identify.png").stat().st_size > 10_000
 
 
+@pytest.mark.thorough
 def test_the_stated_covariance_covers_the_truth(twin, rates, truth, tmp_path):
     """Over draws of the noise the squared distance in the stated metric is chi-squared, 8 degrees each."""
     torque = pulses()

@@ -60,11 +60,13 @@ def printed(folder):
     return done.stdout.strip()
 
 
+@pytest.mark.thorough
 def test_the_slew_prints_the_pages_table_and_draws(folder, printed):
     assert printed in text("examples/README.md")
     assert (folder / "nmpc_slew.png").stat().st_size > 10_000
 
 
+@pytest.mark.thorough
 def test_the_slew_keeps_its_limits_also_with_wrong_masses(printed):
     rows = re.findall(r"\| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|", printed)
     assert len(rows) == 3

@@ -25,7 +25,7 @@ from fmu.flights import (
 )
 from supervessel.rotation.propagators import plan_of
 from support import ERROR, INF, NAN, OK, Instance, U, flying, scene, variant
-from support.marks import FMI
+from support.marks import FMI, some_at_once
 from support.series import flight, norm
 
 
@@ -162,7 +162,7 @@ def test_the_estimate_is_zero_in_model_exchange(fmi):
 
 
 @pytest.mark.parametrize("propagator", ["rk4", "taylor", "exact", "auto"])
-@pytest.mark.parametrize("thin", [1e-3, 1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("thin", some_at_once([1e-3, 1e-6, 1e-9, 1e-12], 1e-9))
 def test_the_estimate_knows_what_rounding_of_the_tensor_comes_to(propagator, thin):
     """A slender vessel docked askew: its least moment drowns in the rounding of the largest."""
     with flying(slender(thin, propagator)) as instance:

@@ -9,6 +9,7 @@ import pytest
 from supervessel import Twin
 from support import DISCARD, EPS, ERROR, OK, Instance, flying, refusal, scene
 from support.gyrostat import Course, Gyrostat, GyrostatState
+from support.marks import FMI_3_AT_ONCE, some_at_once
 from support.orbits import EARTH, ORBIT
 
 TENSOR = [[1.28e8, -2.1e6, 5.3e6], [-2.1e6, 1.07e8, 1.4e6], [5.3e6, 1.4e6, 2.01e8]]
@@ -75,7 +76,7 @@ def flown(raw: dict[str, Any], law: str, step: float, fmi: int = 3) -> tuple[np.
         ("rk4", {"max_angle_step": 0.002}, 1e-9),
     ],
 )
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", some_at_once(LAWS, "tensor", "decoupled"))
 def test_the_motion_along_an_orbit_is_the_true_one(propagator, rotation, allowed, law):
     x, estimate = flown(orbiting(propagator, law, **rotation), law, STEP)
     assert off(x, law, DURATION) < allowed
@@ -86,7 +87,7 @@ def test_the_motion_along_an_orbit_is_the_true_one(propagator, rotation, allowed
     ("propagator", "rotation", "allowed"),
     [("dop853", {}, SMALL), ("rk4", {"max_angle_step": 0.002}, 1e-9)],
 )
-@pytest.mark.parametrize("law", ["tensor", "principal"])
+@pytest.mark.parametrize("law", some_at_once(["tensor", "principal"], "tensor"))
 def test_wheels_in_an_orbit_move_as_they_truly_do(propagator, rotation, allowed, law):
     axes, inertias, momenta = [[0.0, 0.6, 0.8], [1.0, 0.0, 0.0]], [2e4, 0.0], [3e4, -2e4]
     raw = orbiting(propagator, law, **rotation)
@@ -108,7 +109,7 @@ def test_split_is_of_order_two():
 
 
 @pytest.mark.parametrize("propagator", ["taylor", "dop853", "rk4", "split"])
-@pytest.mark.parametrize("fmi", [2, 3])
+@FMI_3_AT_ONCE
 def test_the_twin_steps_as_the_fmu_does(propagator, fmi, tmp_path):
     raw = orbiting(propagator, max_angle_step=1.0, tolerance=0.1 if propagator == "split" else 1e-6)
     twin, u = Twin(scene(raw)), [3.0, -2.0, 5.0]

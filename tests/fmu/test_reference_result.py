@@ -23,7 +23,7 @@ from supervessel.equations import equations
 from supervessel.orbit import two_body
 from supervessel.scene.writing import scene_text
 from support import ISS_DG, TURNING, Array, body, built, scene, variant
-from support.marks import FMI
+from support.marks import FMI, some_at_once
 from support.orbits import EARTH, ORBIT, orbiting
 
 SLOW = TURNING | {"angular_velocity": [0.001, 0.002, -0.001]}
@@ -143,7 +143,12 @@ def assert_same(found: Array, expected: Array, tolerance: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "fmi"), [*((name, 3) for name in SCENES), ("mass and torque", 2), ("closed at the start", 2)]
+    ("name", "fmi"),
+    some_at_once(
+        [*((name, 3) for name in SCENES), ("mass and torque", 2), ("closed at the start", 2)],
+        *((name, 3) for name in ("mass and torque", "port taken", "moving port", "auto", "orbit and dock")),
+        ("closed at the start", 2),
+    ),
 )
 def test_an_importer_that_flies_it_gets_the_reference_result(name, fmi):
     assert_same(flown(name, fmi), table(name, fmi, "outputs"), TOLERANCE.get(name, ROUNDING))

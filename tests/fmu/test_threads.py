@@ -9,7 +9,7 @@ import numpy as np
 
 from fmu.exchange import change
 from support import DISCARD, ISS_DG, OK, Instance, refusal, variant
-from support.marks import FMI, KIND
+from support.marks import FMI, FMI_3_AT_ONCE, KIND
 
 SEED = 20240615
 COUNT = 200
@@ -59,16 +59,18 @@ def life(instance: Instance, exchange: bool, seed: int) -> list[bytes]:
 
 @cache
 def alone(fmi: int, exchange: bool, seed: int) -> list[bytes]:
-    instance = Instance(RAW, fmi, exchange=exchange)
+    instance = Instance(RAW, fmi, optimised=True, exchange=exchange)
     result = life(instance, exchange, seed)
     instance.free()
     return result
 
 
 @KIND
-@FMI
+@FMI_3_AT_ONCE
 def test_two_hundred_instances_on_threads_give_bit_for_bit_what_each_gives_alone(fmi, exchange):
-    instances = [Instance(RAW, fmi, exchange=exchange, name=f"number {i}") for i in range(COUNT)]
+    instances = [
+        Instance(RAW, fmi, optimised=True, exchange=exchange, name=f"number {i}") for i in range(COUNT)
+    ]
     together, threads = Barrier(COUNT), set()
 
     def run(number: int) -> list[bytes]:

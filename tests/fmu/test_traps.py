@@ -19,7 +19,7 @@ from fmpy import read_model_description
 from fmu_build.compile.compiler import fmi_headers
 from fmu_build.platforms import host_platform
 from support import ISS_DG, OK, Instance, body, store, unpacked, variant
-from support.marks import FMI
+from support.marks import FMI, some_at_once
 from support.traps import FLAGS_KNOWN
 
 needs_glibc = pytest.mark.skipif(
@@ -54,10 +54,12 @@ def host() -> Path:
 
 
 @needs_glibc
-@pytest.mark.parametrize("spin", [name for name in SPINS if name != "fast"])
+@pytest.mark.parametrize(
+    "spin", some_at_once([name for name in SPINS if name != "fast"], "rest", "tumbling", "denormal")
+)
 @pytest.mark.parametrize("propagator", ["auto", "taylor"])
 def test_a_host_that_traps_lives(propagator, spin):
-    folder = unpacked(body(propagator=propagator))
+    folder = unpacked(body(propagator=propagator), optimised=True)
     description = read_model_description(str(folder))
     [rate] = [v.valueReference for v in description.modelVariables if v.name == "angular_velocity_start[1]"]
     library = folder / "binaries" / host_platform().name / f"body{host_platform().suffix}"
@@ -67,12 +69,12 @@ def test_a_host_that_traps_lives(propagator, spin):
 
 
 @needs_flags
-@pytest.mark.parametrize("moments", MOMENTS)
+@pytest.mark.parametrize("moments", some_at_once(MOMENTS.keys(), "symmetric"))
 @pytest.mark.parametrize("propagator", PROPAGATORS)
 def test_steps_and_derivatives_of_any_spin_raise_nothing(propagator, moments):
     raw = body(pmi=MOMENTS[moments], propagator=propagator)
     raw["outputs"]["names"] += ["principal_moments", "principal_axes"]
-    instance = Instance(raw)
+    instance = Instance(raw, optimised=True)
     for spin in SPINS.values():
         assert instance.reset() == OK
         assert instance.initialise(angular_velocity_start=spin) == OK

@@ -12,7 +12,7 @@ import hypothesis.strategies as st
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import Phase, assume, given, settings
+from hypothesis import assume, given
 
 from supervessel import Twin, reference
 from supervessel.composite.start import poses_at_start
@@ -29,12 +29,13 @@ from support import (
     scene,
     variant,
 )
+from support.examples import examples
 from support.marks import FMI
 
 Whole = tuple[float, Array, Array]  # mass, barycentre, inertia
 
 # A failing example is not shrunk: with a scene to build for each trial that takes minutes.
-RUN = settings(deadline=None, derandomize=True, max_examples=30, phases=(Phase.explicit, Phase.generate))
+RUN = examples(10, 30)
 
 # Rounding of J, relative to its largest element: C u (1 + distance/size), with `distance` the largest
 # coordinate met on the way from the root's origin and size^2 = tr(J)/M. A pose is a product of at most 5

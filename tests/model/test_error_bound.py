@@ -38,6 +38,7 @@ from supervessel.rotation.propagators.method import StepSymbols
 from supervessel.rotation.propagators.rk4 import rk4_step
 from supervessel.rotation.propagators.taylor import taylor_step
 from support import EPS
+from support.marks import some_at_once
 
 Array = NDArray[np.float64]
 
@@ -152,7 +153,7 @@ def torques(random: np.random.Generator, J: Array) -> list[Array]:
 KINDS = ("general", "general", "symmetric", "slender", "spherical")
 
 
-@pytest.mark.parametrize("law", CHEAP)
+@pytest.mark.parametrize("law", some_at_once(CHEAP, "principal"))
 def test_bound_is_never_exceeded_along_random_flights(law: str) -> None:
     """[EB] eqs. (3) to (20), against DOP853; every second body starts with an error that is not zero."""
     random = np.random.default_rng(16)

@@ -7,17 +7,18 @@ import hypothesis.strategies as st
 import mpmath as mp
 import numpy as np
 import pytest
-from hypothesis import Phase, assume, given, settings
+from hypothesis import assume, given
 
 from supervessel import reference
 from supervessel.composite.inertia import from_upper_triangle, upper_triangle
 from supervessel.rotation import principal as module
 from supervessel.rotation.principal import TIE, principal, principal_forward, quaternion_of_axes
 from support import EPS, Array, U, random_rotation
+from support.examples import examples
 
 DENORMAL = 2.0**-1074
 DIGITS = 60
-RUN = settings(deadline=None, derandomize=True, max_examples=60, phases=(Phase.explicit, Phase.generate))
+RUN = examples(20, 60)
 
 # Twelve rotations; each rounds the elements it changes once, to u of the largest moment at most. Rounded
 # angles cost nothing more, for a rotation by a wrong angle is still one.

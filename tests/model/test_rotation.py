@@ -8,11 +8,12 @@ from typing import Any
 import hypothesis.strategies as st
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import given
 from scipy.integrate import solve_ivp
 
 from supervessel import Twin, reference
 from support import ISS_DG, LAWS, Array, U, body, hamilton, random_rotation, scene, variant
+from support.examples import examples
 
 Flight = tuple[dict[str, Any], Any, Array]  # raw scene, torque, state after DURATION
 
@@ -345,7 +346,7 @@ def spins(draw: st.DrawFn, slow: bool) -> tuple[Array, Array, Array]:
 
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("slow", [False, True], ids=["spinning", "from rest"])
-@settings(deadline=None, derandomize=True, max_examples=25, phases=(Phase.explicit, Phase.generate))
+@examples(8, 25)
 @given(data=st.data())
 def test_body_never_turns_further_than_the_angle_step(law: str, slow: bool, data: st.DataObject) -> None:
     J, omega, torque = data.draw(spins(slow))

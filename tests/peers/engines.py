@@ -62,7 +62,7 @@ def ours(propagator: str, tolerance: float) -> Callable[[Body], Array]:
 
     def fly(body: Body) -> Array:
         support = import_module("support")
-        it = support.Instance(our_scene(propagator, tolerance))
+        it = support.Instance(our_scene(propagator, tolerance), optimised=True)
         status = it.initialise(
             **{
                 "B.pmi": body.moments,

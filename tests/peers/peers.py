@@ -46,7 +46,7 @@ def main(packages: list[str]) -> None:
     chosen = [(i, s) for i, s in chosen if versions[s.package]]
     if "supervessel" in versions:
         for propagator, tolerance in OURS.items():  # compiled before anything has to be done in time
-            import_module("support").built(our_scene(propagator, tolerance))
+            import_module("support").built(our_scene(propagator, tolerance), optimised=True)
     print("| case | u (1 + cond) | " + " | ".join(_title(s) for _, s in chosen) + " |")
     print("|---|---:|" + "---:|" * len(chosen))
     doubtful = {}

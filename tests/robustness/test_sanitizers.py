@@ -19,6 +19,7 @@ import pytest
 
 from fmu_build.compile.compiler import fmi_headers
 from support import ISS_DG, built, variant
+from support.fmus import THOROUGH
 
 pytestmark = pytest.mark.robustness
 
@@ -298,10 +299,12 @@ def test_the_fmu_test_suite_runs_clean_on_libraries_with_sanitizers(tmp_path):
         "SANITIZING_COMPILER": compiler(),
         "SANITIZED_LIBRARIES": str(tmp_path / "libraries"),
         "LD_PRELOAD": preloaded(tmp_path),
+        THOROUGH: "yes",
         "ASAN_OPTIONS": f"{options}:log_path={tmp_path / 'address'}",
         "UBSAN_OPTIONS": f"print_stacktrace=1:log_path={tmp_path / 'undefined'}",
     }
     command = [sys.executable, "-m", "pytest", "-q", "-n", "auto", "-p", "sanitized"]
+    command += ["-m", "not (stability or surroundings)"]  # all others that are thorough
     # The fuzzer looks at memory; names that a debugger is told are in these binaries.
     without = "not leave_no_memory_behind and not nothing_of_it_is_in_the_binary"
     command += ["-k", without, *(str(here.parent / name) for name in ("fmu", "changes", "wheels"))]

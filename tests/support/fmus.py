@@ -6,9 +6,10 @@ import os
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 from fmpy import read_model_description
@@ -29,6 +30,12 @@ from support.scenes import scene
 from support.traps import watch
 
 OK, WARNING, DISCARD, ERROR = range(4)
+
+THOROUGH = "SUPERVESSEL_TESTS_THOROUGH"
+"""Variable that is set where all cases of a test count (`make thorough`, `stability`, `accuracy`): there are
+more random examples (see `support.examples`), and libraries are compiled as users get them. Else they are
+those of trials, compiled in a fifth of the time: the same numbers to the last bit, as
+test_libraries_for_trials_fly_the_same_to_the_last_bit has it."""
 
 
 def refusal(fmi: int) -> int:
@@ -54,22 +61,50 @@ def store() -> Path:
     return Path(os.environ.get("SUPERVESSEL_TESTS") or tempfile.mkdtemp(prefix="supervessel-test-"))
 
 
-def built(raw: Mapping[str, Any], fmi: int = 3, naming: Naming = "structured") -> Path:
-    """Returns the path of the FMU of a raw scene, built once in a session."""
-    path = store() / f"{_digest(raw, fmi, naming)}.fmu"
-    return path if path.exists() else build_fmu(scene(raw), path, fmi, names=naming)
+def built(
+    raw: Mapping[str, Any],
+    fmi: int = 3,
+    naming: Naming = "structured",
+    *,
+    optimised: bool | None = None,
+) -> Path:
+    """Returns the path of the FMU of a raw scene, built once in a session.
+
+    optimised : whether it is to the last byte the one that users get; None: as the session has it
+    """
+    flags = session_flags() if optimised is None else FLAGS if optimised else TRIAL_FLAGS
+    path = store() / f"{_digest([raw, flags], fmi, naming)}.fmu"
+    if path.exists():
+        return path
+    compiled = partial(compile_sources, flags=flags)
+    with mock.patch("fmu_build.build.compile_sources", compiled):
+        return build_fmu(scene(raw), path, fmi, names=naming)
+
+
+def session_flags() -> tuple[str, ...]:
+    """Returns the compiler's flags for libraries of which a test says nothing."""
+    return FLAGS if THOROUGH in os.environ else TRIAL_FLAGS
+
+
+def _is_optimised(fmi: int, asked: bool | None) -> bool:
+    """Whether a library is optimised. That of FMI 2 never is: what both versions share is seen both ways."""
+    return fmi == 3 and (THOROUGH in os.environ if asked is None else asked)
 
 
 def unpacked(
-    raw: Mapping[str, Any], fmi: int = 3, naming: Naming = "structured", *, optimised: bool = True
+    raw: Mapping[str, Any],
+    fmi: int = 3,
+    naming: Naming = "structured",
+    *,
+    optimised: bool | None = None,
 ) -> Path:
     """Returns a folder with all of a raw scene's FMU that is loaded, made once in a session.
 
-    optimised : whether the library is that of `built`; else it is compiled in a fifth of the time. That of
-                FMI 2 never is: what both versions share is seen both ways.
+    optimised : whether the library of FMI 3 is compiled as users get it; None: as the session has it (see
+                `THOROUGH`). For long flights, and where the optimiser is what is tested.
     Pictures and pages are left out.
     """
-    optimised = optimised and fmi == 3
+    optimised = _is_optimised(fmi, optimised)
     folder = store() / _digest([raw, optimised], fmi, naming)
     if folder.is_dir():
         return folder
@@ -117,7 +152,7 @@ class Instance:
         name: str = "it",
         exchange: bool = False,
         *,
-        optimised: bool = True,
+        optimised: bool | None = None,
         naming: Naming = "structured",
         **instantiation: Any,
     ) -> None:

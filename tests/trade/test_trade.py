@@ -17,6 +17,7 @@ from fmu_build.trade.ranking import SAME_TIME, ranks
 from fmu_build.trade.study import errors
 from supervessel import parse_scene, reference
 from support import U, variant
+from support.marks import some_at_once
 from support.processes import kept_in
 from support.series import flight, mp, norm
 
@@ -69,6 +70,12 @@ def tumbling() -> dict[str, Any]:
 def trade() -> dict[str, Any]:
     """The quick trade of the body with steady mass."""
     return study(parse_scene(STEADY), quick=True)
+
+
+@pytest.fixture(scope="module")
+def drawn(trade) -> dict[str, bytes]:
+    """The plot of that trade."""
+    return plot(trade)
 
 
 def inertia_and_torque() -> list[tuple[np.ndarray, np.ndarray]]:
@@ -156,6 +163,7 @@ def test_tolerances_are_kept_step_by_step(trade):
 
 
 @pytest.mark.parametrize("law", ["principal", "tensor"])
+@pytest.mark.thorough
 def test_an_unstable_motion_without_torque_is_found_in_closed_form(tumbling, law, shop):
     """Beside 60 digits: what steps leave grows with each turn-over, what starts once is off by 1e-12."""
     [model] = [m for m in tumbling["models"] if (m["law"], m["frozen"]) == (law, "mass")] or [None]
@@ -189,6 +197,7 @@ def test_an_unstable_motion_without_torque_is_found_in_closed_form(tumbling, law
     assert f"< {stepped:.0e}" in table(tumbling)
 
 
+@pytest.mark.thorough
 def test_errors_of_integration_below_a_models_own_doubt_are_not_told(tumbling):
     text = table(tumbling).split("| model | propagator |")[1]
     for model in tumbling["models"]:
@@ -295,23 +304,25 @@ def test_without_an_experiment_there_is_no_trade():
         study(scene)
 
 
-def test_tables_and_plots_show_every_choice(trade):
+def test_tables_and_plots_show_every_choice(trade, drawn):
     text = table(trade)
     assert text.count("| tensor |") == 1 + sum(row["law"] == "tensor" for row in trade["choices"])
-    drawn = plot(trade)
     assert drawn["png"].startswith(b"\x89PNG")
     assert drawn["svg"].decode().count("<use ") >= len(trade["choices"])
     assert plot(trade) == drawn
 
 
 @pytest.mark.parametrize(
-    "name", ["matplotlibrc", "matplotlib.py", "sitecustomize.py", "MPLBACKEND", "MATPLOTLIBRC"]
+    "name",
+    some_at_once(
+        ["matplotlibrc", "matplotlib.py", "sitecustomize.py", "MPLBACKEND", "MATPLOTLIBRC"],
+        "matplotlib.py",
+    ),
 )
 def test_a_plot_is_drawn_whatever_lies_in_the_working_folder_and_the_surroundings(
-    trade, tmp_path, monkeypatch, name
+    trade, drawn, tmp_path, monkeypatch, name
 ):
     """And nothing is left in the user's home."""
-    drawn = plot(trade)
     monkeypatch.chdir(tmp_path)
     home = tmp_path / "home"
     home.mkdir()

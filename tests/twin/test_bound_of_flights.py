@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from supervessel import Scene, Twin, parse_scene, reference
+from support.marks import some_at_once
 from twin.scenes import numbers, random_scene
 
 Array = NDArray[np.float64]
@@ -96,7 +97,10 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("law", "seed", "kept"), CASES)
+QUICK = [case for case in CASES if case[1] in ("docked", 0)]
+
+
+@pytest.mark.parametrize(("law", "seed", "kept"), some_at_once(CASES, *QUICK))
 def test_bound_holds_through_jumps_of_mass_pose_and_docks(law: str, seed: Any, kept: tuple[str, str]) -> None:
     """[EB] eqs. (21), (22), in the order in which a change is made."""
     raw = docked_scene(moving=law != "none") if seed == "docked" else random_scene(seed)

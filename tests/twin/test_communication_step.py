@@ -17,6 +17,7 @@ from fmu_build.generate.sources import LAYER
 from supervessel import Twin
 from supervessel.twin.functions import TwinFunction
 from support import EPS, ISS_DG, OK, STEADY, Array, Instance, body, scene, variant
+from support.marks import some_at_once
 from twin.scenes import numbers, random_inputs, random_scene
 
 STARTS = 12  # of flights of each scene
@@ -87,7 +88,7 @@ def start(fmu: Instance, twin: Twin, x: Array, u: Array, p: Array) -> None:
     assert fmu.exit() == OK, fmu.log
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", some_at_once(SCENES.keys(), "auto", "momentum", "docks", "rk4"))
 def test_communication_step_is_the_fmus_to_the_last_bit(name: str, folder: Path) -> None:
     twin, rng = twin_of(name), np.random.default_rng(len(name))
     step, fmu = twin.communication_step(folder), Instance(SCENES[name])
@@ -190,7 +191,7 @@ def by_differences(step: TwinFunction, at: list[Array], which: int, size: float)
     return np.column_stack(columns)
 
 
-@pytest.mark.parametrize("propagator", ["rk4", "dop853", "taylor"])
+@pytest.mark.parametrize("propagator", some_at_once(["rk4", "dop853", "taylor"], "dop853"))
 def test_derivatives_of_one_sub_step_are_those_of_the_step(propagator: str, folder: Path) -> None:
     twin = Twin(scene(random_assembly(3, "rk4")), propagator=propagator)
     symbols = [ca.MX.sym("m", n) for n in (7, 3, len(twin.p_names), 1)]

@@ -12,6 +12,7 @@ import pytest
 from supervessel import Twin
 from supervessel.rotation.propagators.exact import SHORT
 from support import body, scene, variant
+from support.marks import some_at_once
 
 mp = mpmath.MPContext()
 
@@ -106,7 +107,13 @@ def blocks(jacobian: np.ndarray) -> list[np.ndarray]:
 
 @pytest.mark.parametrize("propagator", ["exact", pytest.param("split", marks=pytest.mark.stability)])
 @pytest.mark.parametrize("name", MOMENTS)
-@pytest.mark.parametrize(("rate", "h"), [*((angle / 0.8, 0.8) for angle in ANGLES), (0.9, 1e-9)])
+@pytest.mark.parametrize(
+    ("rate", "h"),
+    some_at_once(
+        [*((angle / 0.8, 0.8) for angle in ANGLES), (0.9, 1e-9)],
+        *((angle / 0.8, 0.8) for angle in (0.0, 1e-310, ANGLES[-1])),
+    ),
+)
 def test_derivatives_are_right_however_little_the_body_turns(propagator, name, rate, h):
     """By state and time, and by moments that tell axes apart, in every mode: 1e-12 of each block.
 

@@ -3,7 +3,7 @@
 import doctest
 import inspect
 from collections.abc import Iterator
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -53,14 +53,19 @@ def unwrapped(member: Any) -> Any:
 DOCUMENTED = dict(documented())
 
 
+@cache
+def iss_dg() -> Twin:
+    """Returns the twin that examples are given, whose scene they are given too; neither ever changes."""
+    return Twin(load_scene(ROOT / "examples" / "iss_dg.toml"))
+
+
 @pytest.mark.parametrize("name", DOCUMENTED)
 def test_each_public_function_has_an_example_that_runs(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "examples").symlink_to(ROOT / "examples", target_is_directory=True)
     monkeypatch.chdir(tmp_path)
-    scene = load_scene("examples/iss_dg.toml")
-    given = {"ca": ca, "np": np, "reference": reference, "scene": scene, "twin": Twin(scene)}
+    given = {"ca": ca, "np": np, "reference": reference, "scene": iss_dg().scene, "twin": iss_dg()}
     examples = doctest.DocTestParser().get_doctest(DOCUMENTED[name] or "", given, name, None, 0)
     assert examples.examples
     printed: list[str] = []

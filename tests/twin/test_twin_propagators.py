@@ -23,6 +23,7 @@ from support import (
     series,
     variant,
 )
+from support.marks import some_at_once
 from twin.scenes import numbers
 
 RATES = [0.05, -0.08, 0.11]
@@ -175,7 +176,12 @@ def test_free_motion_of_too_many_turns_is_nan(pmi, doublings, propagator):
 
 
 @pytest.mark.parametrize(
-    ("way", "count", "h"), [("rollout", 5000, 0.04), ("fold", 20000, 0.01), ("FMU", 5000, 0.04)]
+    ("way", "count", "h"),
+    some_at_once(
+        [("rollout", 5000, 0.04), ("fold", 20000, 0.01), ("FMU", 5000, 0.04)],
+        ("rollout", 5000, 0.04),
+        ("FMU", 5000, 0.04),
+    ),
 )
 def test_many_steps_of_free_motion_end_where_one_does(way, count, h):
     """Over 180 rad. From one start 8 u (1 + angle); each rate u off, 0.6 u count^1.5 angle of a step.
