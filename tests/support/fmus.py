@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
-from unittest import mock
 
 import numpy as np
+import pytest
 from fmpy import read_model_description
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
@@ -77,7 +77,8 @@ def built(
     if path.exists():
         return path
     compiled = partial(compile_sources, flags=flags)
-    with mock.patch("fmu_build.build.compile_sources", compiled):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("fmu_build.build.compile_sources", compiled)
         return build_fmu(scene(raw), path, fmi, names=naming)
 
 
