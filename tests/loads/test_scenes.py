@@ -8,6 +8,7 @@ from fmu_build.flight.choices import laws_of
 from loads.scenes import NEAR
 from supervessel.composite.resolved import resolve
 from supervessel.equations import equations
+from supervessel.scene.outputs import VESSEL_OUTPUTS
 from support import ISS_DG, scene, variant
 from support.pages import text
 from support.refusals import problems
@@ -20,7 +21,7 @@ NAMED = variant(
     },
 )
 MOVING = "accelerations are not known where inputs.motion lists ports; leave one of the two out"
-VESSEL = "origin, centre_of_mass, attitude, angular_velocity, angular_momentum"
+VESSEL = ", ".join(VESSEL_OUTPUTS)
 
 
 @pytest.mark.parametrize(
