@@ -15,7 +15,9 @@ from supervessel.problems import printable
 from support import BALL
 from support.compilers import fake_compiler
 from support.marks import some_at_once
-from support.processes import ROOT, names_in, needs_posix
+from support.processes import ROOT, cache, names_in, needs_posix
+
+__all__ = ["cache"]
 
 BROKEN = BALL.replace("mass = 2.0", "mass = -2.0").replace('root = "B"', 'root = "C"') + "colour = 3\n"
 
@@ -51,6 +53,12 @@ def run(folder, *arguments, **environment):
         text=True,
         check=False,
     )
+
+
+@pytest.fixture
+def spent(tmp_path_factory):
+    """A cache for a compiler that fails: the next one begins anew there, with no files of its own."""
+    return tmp_path_factory.mktemp("spent")
 
 
 def assert_failed(done, *lines):
@@ -226,7 +234,8 @@ def test_a_path_that_cannot_be_printed_is_a_failure_without_traceback(folder):
 
 
 @needs_linux
-def test_a_full_temporary_folder_is_a_failure_without_traceback(folder):
+def test_a_full_temporary_folder_is_a_failure_without_traceback(folder, spent, monkeypatch):
+    monkeypatch.setenv("SUPERVESSEL_CACHE", str(spent))
     command = f"ulimit -f 1 && exec {sys.executable} -m fmu_build ball.toml"
     done = subprocess.run(["sh", "-c", command], cwd=folder, capture_output=True, text=True, check=False)
     assert "Traceback" not in done.stderr
@@ -234,8 +243,8 @@ def test_a_full_temporary_folder_is_a_failure_without_traceback(folder):
 
 
 @needs_posix
-def test_a_compiler_that_fails_is_quoted_on_stderr(folder, tmp_path_factory):
-    done = run(folder, "ball.toml", PYTHONPATH=failing(tmp_path_factory))
+def test_a_compiler_that_fails_is_quoted_on_stderr(folder, spent, tmp_path_factory):
+    done = run(folder, "ball.toml", PYTHONPATH=failing(tmp_path_factory), SUPERVESSEL_CACHE=spent)
     assert done.stderr.startswith("compiler for ")
     assert "error: no disk, no ink" in done.stderr
     assert done.stderr.splitlines()[-1].startswith("The compiler's cache is ")
@@ -258,14 +267,14 @@ def failing(tmp_path_factory):
 
 @needs_posix
 @pytest.mark.parametrize("reason", ["the scene", "the compiler", "the compiler's cache"])
-def test_an_old_fmu_survives_a_build_that_fails(folder, reason, tmp_path_factory):
+def test_an_old_fmu_survives_a_build_that_fails(folder, reason, spent, tmp_path_factory):
     output = folder / "ball.fmu"
     old = an_fmu(output)
     environment = {}
     if reason == "the scene":
         (folder / "ball.toml").write_text(BROKEN)
     elif reason == "the compiler":
-        environment["PYTHONPATH"] = failing(tmp_path_factory)
+        environment |= {"PYTHONPATH": failing(tmp_path_factory), "SUPERVESSEL_CACHE": spent}
     else:
         environment["SUPERVESSEL_CACHE"] = folder / "ball.toml"
     before = names_in(folder)

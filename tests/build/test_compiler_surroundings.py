@@ -51,6 +51,7 @@ def test_a_compiler_gets_two_variables_and_no_other(tmp_path, monkeypatch):
     heard = tmp_path / "heard"
     site = fake_compiler(tmp_path / "site", f"cat /proc/$$/environ > {heard}; exit 1")
     monkeypatch.syspath_prepend(site)
+    monkeypatch.setenv("SUPERVESSEL_CACHE", str(tmp_path / "cache"))  # the next compiler would begin anew
     for name in HOSTILE:
         monkeypatch.setenv(name, str(tmp_path))
     with pytest.raises(BuildError, match=r"compiler for .* failed"):

@@ -18,6 +18,7 @@ from supervessel import Twin
 from supervessel.twin.functions import TwinFunction
 from support import EPS, ISS_DG, OK, STEADY, Array, Instance, body, scene, variant
 from support.marks import some_at_once
+from support.processes import begin_cache
 from twin.scenes import numbers, random_inputs, random_scene
 
 STARTS = 12  # of flights of each scene
@@ -226,9 +227,14 @@ def test_derivatives_of_many_sub_steps_are_those_of_the_motion(folder: Path) -> 
         assert np.abs(found - truth).max() <= error
 
 
-def test_a_function_that_calls_the_communication_step_cannot_be_generated(folder: Path) -> None:
+@pytest.mark.thorough
+def test_a_function_that_calls_the_communication_step_cannot_be_generated(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     twin = twin_of("no p")
     steps = twin.communication_step(folder).mapaccum(3)
+    begin_cache(tmp_path)  # where the linker fails, the next compiler begins anew
+    monkeypatch.setenv("SUPERVESSEL_CACHE", str(tmp_path))
     with pytest.raises(BuildError, match="undefined symbol: communication_step"):
         twin.generate(folder, [steps], derivatives=0)
 
