@@ -61,9 +61,8 @@ def test_levels_of_tanks_that_a_class_no_longer_has_are_said_and_not_used(files)
     assert raw["vessels"]["GL_01"]["mass"] == 11000.0 + 0.5 * 12000.0 + 600.0
     assert raw["vessels"]["Station"]["mass"] == 20e3 + 0.25 * 500.0
     assert files.notes() == [
-        'side.scn:23: PRPLEVEL of tank 2: class "Glider" of "GL-01" has tanks 0 to 1; not used',
-        'side.scn:23: PRPLEVEL of tank 3: class "Glider" of "GL-01" has tanks 0 to 1; not used',
-        'side.scn:18: PRPLEVEL of tank 1: class "Hub" of "Station" has tanks 0 to 0; not used',
+        'side.scn:23: PRPLEVEL of tanks 2, 3: class "Glider" of "GL-01" has tanks 0 to 1; not used',
+        'side.scn:18: PRPLEVEL of tank 1: class "Hub" of "Station" has tank 0 only; not used',
     ]
 
 
@@ -82,6 +81,7 @@ BLOCKS = {
     "with a word behind": ("BEGIN_MFD Left", "END_MFD"),
     "an at sign": ("@SUBSYSTEM OMS", "@ENDSUBSYSTEM OMS"),
     "angles": ("<INTERNALS>", "</INTERNALS>"),
+    "END X": ("INTERNAL: v1.0.0B", "END INTERNAL"),
 }
 INNER = """\
   STATUS Landed Mars
@@ -106,6 +106,18 @@ def test_lines_in_a_block_of_a_vessels_code_are_not_its_own(files, opening, clos
     assert files.notes(vessel="Station") == [
         f"side.scn:{inner}: PRPLEVEL 0:0.125: a level in the block {shown} of the code of "
         f'"Station", not read; the vessel\'s own is in line {own}'
+    ]
+
+
+def test_the_block_of_orbiters_dragonfly_is_not_its_own_and_its_tanks_are_said(files):
+    expected = files.raw()
+    inner = "HYDRAULICS:\nTANK 1 0.0 129964 170.0\nTANK 0 0.0 1 1\nPANEL :\nSW 0 1\nSW END\nROT END\nFUEL 0.1"
+    block = f"INTERNAL: v1.0.0B\n{inner}\nEND INTERNAL\n"
+    text = files.replace(files.scenario, ("  AROT 30.00", block + "  AROT 30.00"))
+    assert files.raw() == expected
+    assert files.notes() == [
+        f"side.scn:{line_of(text, 'TANK')}: TANK 1 0.0 129964 170.0: a level in the block INTERNAL: v1.0.0B "
+        f'of the code of "Station", not read; the vessel\'s own is in line {line_of(text, "PRPLEVEL")}'
     ]
 
 

@@ -17,7 +17,7 @@ from supervessel.orbiter.classes import (
     section_place,
 )
 from supervessel.orbiter.docks import Mention, assemblies, docks, mentions
-from supervessel.orbiter.scenario import KEYS, LEVELS, Entry, Scenario, Ship, read_scenario
+from supervessel.orbiter.scenario import KEYS, LEVELS, LEVELS_OF_CODE, Entry, Scenario, Ship, read_scenario
 from supervessel.orbiter.start import saved_motion, start_of
 from supervessel.orbiter.text import Note, Place, ScenarioError, foreign, numbers
 from supervessel.orbiter.writing import Assembled, Member, Start, scene_text
@@ -265,10 +265,12 @@ def _masses(
     if entry is None and count:
         notes.append(Note(ship.place, f"{quantity(ship.name)} has neither PRPLEVEL nor FUEL: taken as full"))
     elif entry is not None and entry.key == "PRPLEVEL":
-        for tank in sorted(set(levels.given) - set(range(count))):
-            has = f"tanks 0 to {count - 1}" if count else "no tanks"
+        gone = sorted(set(levels.given) - set(range(count)))
+        if gone:
+            has = f"tanks 0 to {count - 1}" if count > 1 else "tank 0 only" if count else "no tanks"
             whose = f"class {quantity(ship.class_name)} of {quantity(ship.name)} has {has}"
-            notes.append(Note(entry.place, f"PRPLEVEL of tank {tank}: {whose}; not used"))
+            which = f"tank{'s' if len(gone) > 1 else ''} {listed(map(str, gone), len(gone))}"
+            notes.append(Note(entry.place, f"PRPLEVEL of {which}: {whose}; not used"))
         for tank in sorted(set(range(count)) - set(levels.given)):
             text = f"{quantity(ship.name)} has no level of tank {tank}: taken as empty"
             notes.append(Note(entry.place, text))
@@ -336,7 +338,7 @@ def _levels_of_code(ship: Ship) -> Iterator[Note]:
     counts = f"the vessel's own is in line {own.place.line}" if own else "the vessel has none of its own"
     seen: set[Place] = set()
     for opening, entry in ship.code:
-        if entry.key in LEVELS and opening.place not in seen:
+        if entry.key in LEVELS_OF_CODE and opening.place not in seen:
             seen.add(opening.place)
             whose = f"a level in the block {opening} of the code of {quantity(ship.name)}"
             yield Note(entry.place, f"{entry}: {whose}, not read; {counts}")

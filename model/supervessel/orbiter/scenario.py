@@ -24,7 +24,10 @@ OPENING = (
     (re.compile(r"@(?!END)(.+)"), r"@END\1"),
     (re.compile(r"<(?!/)(.+)>"), r"</\1>"),
 )
-"""Keys in capitals that open a block, and the key that closes it."""
+"""Keys in capitals that open a block, and the key that closes it. So do KEY or KEY: and a line END KEY."""
+
+LEVELS_OF_CODE = LEVELS | {"TANK"}
+"""Keys in blocks that say how full tanks are, of Orbiter's own Dragonfly the last one."""
 
 
 @dataclass(frozen=True)
@@ -148,7 +151,7 @@ def _blocks(entries: Sequence[Entry]) -> tuple[list[Entry], list[tuple[Entry, En
 
     A line with words after its key that no line closes is one of its own: it gives a value.
     """
-    last = {entry.key: place for place, entry in enumerate(entries)}
+    last = {_closed_by(entry): place for place, entry in enumerate(entries)}
     own: list[Entry] = []
     code: list[tuple[Entry, Entry]] = []
     opened: Entry | None = None
@@ -157,8 +160,10 @@ def _blocks(entries: Sequence[Entry]) -> tuple[list[Entry], list[tuple[Entry, En
     while place < len(entries):
         entry = entries[place]
         closing = _closing(entry.key)
-        if closing and last.get(closing, -1) > place:
-            end = _end(entries, place, closing)
+        named = "" if entry.key in KEYS else f"END {entry.key.rstrip(':')}"
+        found = next((line for line in (closing, named) if line and last.get(line, -1) > place), "")
+        if found:
+            end = _end(entries, place, found)
             code += [(entry, inner) for inner in entries[place + 1 : end]]
             place = end + 1
             continue
@@ -169,6 +174,11 @@ def _blocks(entries: Sequence[Entry]) -> tuple[list[Entry], list[tuple[Entry, En
         own.append(entry)
         place += 1
     return own, code, unclosed
+
+
+def _closed_by(entry: Entry) -> str:
+    """Returns what a line is called where it closes a block: its key, or END and the first word after it."""
+    return f"END {entry.words[0].upper()}" if entry.key == "END" and entry.words else entry.key
 
 
 def _closing(key: str) -> str:
@@ -187,9 +197,9 @@ def _end(entries: Sequence[Entry], begin: int, closing: str) -> int:
     """
     depth = end = 0
     for place in range(begin, len(entries)):
-        key = entries[place].key
-        depth += (key == entries[begin].key) - (key == closing)
-        end = place if key == closing else end
+        closes = _closed_by(entries[place]) == closing
+        depth += (entries[place].key == entries[begin].key) - closes
+        end = place if closes else end
         if depth == 0:
             break
     return end
