@@ -95,7 +95,7 @@ void docks_contact_velocity(Instance *instance, const double p[], double velocit
     instance->arg[0] = p;
     instance->arg[1] = motion;
     instance->res[0] = velocity;
-    contact_velocity(instance->arg, instance->res, instance->iw, instance->w, 0);
+    instance_call(instance, contact_velocity, false);
 }
 
 void docks_contact_velocity_forward(Instance *instance, const Variation *v, double velocity[3]) {

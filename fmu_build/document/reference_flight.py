@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil, inf, sqrt
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -133,9 +134,10 @@ def exchange_flight(model: Equations, stimuli: Stimuli) -> tuple[Array, Array]:
         times.append(end)
         rows.append(_outputs(model, x, old))
         if np.any(old != new):
+            handed = _handed_over(model, x, (old, new))
             x = _changed(model, change, x, (old, new))
             times.append(end)
-            rows.append(_outputs(model, x, new))
+            rows.append(_outputs(model, x, new) + handed)
     return np.array(times), np.vstack(rows)
 
 
@@ -310,6 +312,30 @@ def _changed(model: Equations, change: ca.Function | None, x: Array, inputs: tup
     before, after = inputs
     k = after[p : len(after) - len(model.names.u)]
     return np.concatenate([x[:4], np.array(change(x[4:], before[:p], after[:p], k)).ravel(), x[7:]])
+
+
+def _handed_over(model: Equations, x: Array, inputs: tuple[Array, Array]) -> Array:
+    """Returns what a change of inputs adds to the outputs at its instant, (outputs,).
+
+    x      : before the change
+    inputs : before and after it; neither poses change nor masses that keep the momentum
+    See `rotation.hand_over`.
+    """
+    found, handed, p = np.zeros(len(model.names.y)), model.hand_over, len(model.names.p)
+    if handed is None:
+        return found
+    before, after = (_composite(model, each) for each in inputs)
+    flags = np.array([variable.boolean for variable in model.resolved.shaping])
+    velocity: Any = np.zeros(3)
+    if handed.contact_velocity is not None and np.any((inputs[1] > inputs[0])[:p][flags]):
+        k = inputs[1][p : len(inputs[1]) - len(model.names.u)]
+        velocity = handed.contact_velocity(inputs[1][:p], k)
+    vector = np.array(handed.handed_over(x, x[4:], before, after, after, after, velocity)).ravel()
+    for group, place in handed.slices.items():
+        if group in model.resolved.scene.outputs.names:
+            first = model.names.y.index(f"{group}[1]")
+            found[first : first + place.stop - place.start] = vector[place]
+    return found
 
 
 def _composite(model: Equations, inputs: Array) -> Array:

@@ -257,6 +257,12 @@ SHAPES = {
     "docks": DOCKS,
     "docks, the rate kept": variant(DOCKS, {"rotation": STEADY}),
     "docks, momentum for a state": variant(DOCKS, {"rotation": {"mass_change": "momentum"}}),
+    "a vessel that leaves, and jumps": variant(
+        DOCKS, {"outputs.names": ["barycentre_velocity_jump", "DG.velocity", "DG.attitude"]}
+    ),
+    "jumps, the rate never changes": variant(
+        ISS_DG, {"inputs": {"mass": ["DG"]}, "outputs.names": ["barycentre_jump"]}
+    ),
 }
 """What the C layer compiles differently."""
 

@@ -17,14 +17,15 @@ from fmpy.fmi1 import FMICallException
 from changes.histories import EVENTS, Values, assembly, elements, legal, start_values
 from support import EPS, ISS_DG, OK, TURNING, Array, Instance, scene, variant
 
-OF_VESSELS = ("origin", "centre_of_mass", "attitude", "angular_velocity", "angular_momentum")
+OF_VESSELS = ("origin", "centre_of_mass", "attitude", "angular_velocity", "angular_momentum", "velocity")
+OF_BARYCENTRE = ("barycentre_velocity", "barycentre_jump", "barycentre_velocity_jump")
 OF_ALL = ("mass", "barycentre", "pmi", "inertia", "angular_velocity", "attitude", "kinetic_energy")
 SHOWN = [*OF_ALL, "angular_momentum", "principal_moments", "principal_axes", "error_estimate", "net_force"]
 
 
 def shown(raw: dict[str, Any], *vessels: str) -> dict[str, Any]:
     """Returns the scene with every output that it can have, those of some vessels among them."""
-    names = [*SHOWN, *(f"{vessel}.{what}" for vessel in vessels for what in OF_VESSELS)]
+    names = [*SHOWN, *OF_BARYCENTRE, *(f"{vessel}.{what}" for vessel in vessels for what in OF_VESSELS)]
     if not (raw["inputs"].get("force")):
         names.remove("net_force")
     return variant(raw, {"outputs.names": names})
@@ -83,6 +84,10 @@ POSES = (".position", ".direction", ".alignment")
 SIGNIFICANT = 1e-9
 """Of the largest derivative of an unknown, by knowns of their magnitudes: what is smaller may be the rounding
 of a zero."""
+
+
+REACH = 30.0
+"""m, m/s: of a jump, the difference of numbers of the whole, which may be 0 where it is differentiated."""
 
 
 @dataclass
@@ -203,6 +208,7 @@ class Place:
             self.knowns.append("time")
         vectors = np.array([name.partition("[")[0] for name in self.unknowns])
         self.groups = [vectors == vector for vector in vectors]  # where the vector of each unknown stands
+        self.jumps = np.array(["_jump" in name for name in self.unknowns])
         elements = md.initialUnknowns if self.initialising else [*md.outputs, *md.derivatives]
         self.declared = {e.variable.name: [known.name for known in e.dependencies] for e in elements}
 
@@ -243,6 +249,7 @@ class Place:
         d = [(self.values({name: x + h}) - self.values({name: x - h})) / (2.0 * h) for h in steps]
         first, second = (4.0 * d[1] - d[0]) / 3.0, (4.0 * d[2] - d[1]) / 3.0
         largest = np.array([size[group].max() for group in self.groups])
+        largest[self.jumps] = REACH
         return second, np.abs(second - first) + 256 * EPS * largest / steps[2], max(abs(x), 0.1)
 
     def both(self) -> tuple[Array, Array]:

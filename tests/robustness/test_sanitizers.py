@@ -113,6 +113,7 @@ MOVING = variant(
         ],
     },
 )
+JUMPS = ("barycentre_velocity", "barycentre_jump", "barycentre_velocity_jump")
 DOCKS = [{"name": "berth", "ports": ["A.fore", "B.aft"]}, {"name": "tail", "ports": ["B.fore", "C.aft"]}]
 RIVAL = {"name": "rival", "ports": ["A.fore", "C.aft"], "docked": False}
 ORBIT = {
@@ -121,8 +122,18 @@ ORBIT = {
 }
 CHANGING = {
     "moving": MOVING,
-    "mixed": variant(MOVING, {"rotation.mass_change": "rate"}),
-    "docks": variant(MOVING, {"docks": DOCKS, "inputs.docked": ["berth", "tail"]}),
+    "mixed": variant(
+        MOVING,
+        {"rotation.mass_change": "rate", "outputs.names": [*MOVING["outputs"]["names"], *JUMPS]},
+    ),
+    "docks": variant(
+        MOVING,
+        {
+            "docks": DOCKS,
+            "inputs.docked": ["berth", "tail"],
+            "outputs.names": [*MOVING["outputs"]["names"], "C.velocity", *JUMPS],
+        },
+    ),
     "capture": variant(
         MOVING,
         {
