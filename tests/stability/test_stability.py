@@ -236,7 +236,8 @@ MOMENTUM = "kinetic_energy", "angular_momentum", "attitude"
 
 
 @pytest.mark.parametrize(
-    "inertia", [np.diag([1.0, 2.0, 2.5]), np.array(TEMPLATE)], ids=["diagonal", "full tensor"]
+    "inertia",
+    some_at_once({"diagonal": np.diag([1.0, 2.0, 2.5]), "full tensor": np.array(TEMPLATE)}, "full tensor"),
 )
 @pytest.mark.parametrize(("propagator", "tolerance"), [("exact", 0.0), ("auto", 0.0), ("taylor", 1e-15)])
 def test_a_million_steps_keep_momentum_and_energy(propagator, tolerance, inertia):

@@ -1,6 +1,9 @@
 """A small trade: references against 25 digits, errors apart, order, front, and what is kept."""
 
 import json
+from collections.abc import Iterator
+from functools import partial
+from importlib import import_module
 from itertools import pairwise
 from math import isfinite
 from typing import Any
@@ -9,17 +12,22 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from fmu_build.compile.compiler import TRIAL_FLAGS
 from fmu_build.flight.choices import BEST, Choice, Model, label
 from fmu_build.flight.experiment import course_of
 from fmu_build.flight.flying import fly_all
+from fmu_build.flight.workshop import workshop
 from fmu_build.trade import TradeError, drift_table, plot, study, table
 from fmu_build.trade.ranking import SAME_TIME, ranks
 from fmu_build.trade.study import errors
 from supervessel import parse_scene, reference
 from support import U, variant
+from support.fmus import session_flags
 from support.marks import some_at_once
 from support.processes import kept_in
 from support.series import flight, mp, norm
+
+STUDY = import_module("fmu_build.trade.study")
 
 BODY: dict[str, Any] = {
     "name": "traded",
@@ -58,6 +66,14 @@ TUMBLING = variant(
     },
 )
 """A spin about the middle axis; with the moments left at their start it turns over again and again."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def quick_libraries() -> Iterator[None]:
+    """Has a trade's libraries compiled as those of other tests."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(STUDY, "workshop", partial(workshop, trial=session_flags() == TRIAL_FLAGS))
+        yield
 
 
 @pytest.fixture(scope="module")

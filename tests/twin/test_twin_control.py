@@ -498,6 +498,7 @@ def test_generating_c_minds_no_model_py_of_the_users(tmp_path: Path) -> None:
 # Types
 
 
+@pytest.mark.thorough
 def test_type_checkers_see_the_interface(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(
