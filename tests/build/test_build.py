@@ -272,7 +272,7 @@ SHAPES = {
     some_at_once(SHAPES, "every step, free motion", "docks, momentum for a state"),
 )
 @pytest.mark.parametrize("compiler", COMPILERS)
-@FMI
+@FMI_3_AT_ONCE
 def test_the_hand_written_c_compiles_without_warnings(tmp_path, fmi, compiler, raw):
     command = COMPILERS[compiler]
     if shutil.which(command[0]) is None:

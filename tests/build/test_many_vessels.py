@@ -88,7 +88,7 @@ def compiled_for(name: str) -> Compiled:
     return Compiled(parse_scene(SCENES[name]), Path(tempfile.mkdtemp(dir=store())))
 
 
-@pytest.fixture(scope="module", params=some_at_once(SCENES.keys(), "everything", "in Orbiter's convention"))
+@pytest.fixture(scope="module", params=some_at_once(SCENES.keys(), "everything"))
 def both(request) -> tuple[Compiled, Equations, np.ndarray]:
     """The loop, the straight code, and values of the inputs that are off the scene's."""
     scene = parse_scene(SCENES[request.param])

@@ -91,6 +91,7 @@ def test_an_unknown_platform_is_wrong_usage_and_the_nearest_is_named(capsys):
     assert 'unknown platform "aarch64-linus" (did you mean "aarch64-linux"?)' in capsys.readouterr().err
 
 
+@pytest.mark.thorough
 def test_a_platform_that_does_not_compile_is_named_with_the_compilers_words(tmp_path: Path):
     files = {"model.c": b'#ifdef __aarch64__\n#error "not for this machine"\n#endif\n'}
     both = platforms_named(["x86_64-linux", "aarch64-linux"])

@@ -25,7 +25,7 @@ from fmu_build.storage.cache import cache_folder
 from supervessel.rotation.propagators import PROPAGATORS
 from support import ISS_DG, OK, STEADY, Instance, body, built, scene, variant
 from support.costs import station
-from support.marks import FMI, FMI_3_AT_ONCE
+from support.marks import FMI, FMI_3_AT_ONCE, some_at_once
 from support.orbits import EARTH, ORBIT
 from wheels.scenes import CARRIER
 
@@ -224,7 +224,7 @@ def test_fmi_2_lists_its_source_files_in_the_model_description():
     assert listed == sorted(name for name in packed_sources(2) if name.endswith(".c"))
 
 
-@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("compiler", some_at_once(list(COMPILERS), "gcc"))
 @FMI_3_AT_ONCE
 def test_the_sources_compile_to_a_library_with_bit_identical_results(tmp_path, fmi, compiler):
     fmpy.extract(str(built(ISS_DG, fmi, optimised=True)), unzipdir=str(tmp_path))

@@ -91,11 +91,17 @@ def assert_same(found: Array, end: Array, h: float) -> None:
 
 @pytest.mark.parametrize(
     ("propagator", "law"),
-    [
-        *((propagator, "tensor") for propagator in PROPAGATORS),
+    some_at_once(
+        [
+            *((propagator, "tensor") for propagator in PROPAGATORS),
+            ("exact", "principal"),
+            ("taylor", "principal"),
+        ],
+        ("rk4", "tensor"),
+        ("dop853", "tensor"),
         ("exact", "principal"),
         ("taylor", "principal"),
-    ],
+    ),
 )
 def test_step_is_the_fmus(propagator, law):
     raw = assembly(propagator, law)
