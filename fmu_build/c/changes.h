@@ -7,9 +7,9 @@
 #ifndef CHANGES_H
 #define CHANGES_H
 
+#include "actions.h"
 #include "composite.h"
 #include "instance.h"
-#include "motors.h"
 
 /* What kind of change an input of the composite makes, as bits. */
 enum { KIND_MASS = 1, KIND_POSE = 2, KIND_DOCKED = 4 };
@@ -71,7 +71,7 @@ static inline Status changes_enter_event(Instance *instance) {
 /* Ends an iteration of event mode: judges what was set, and whether that changed the states. */
 static inline Status changes_end_event(Instance *instance, bool *states_changed) {
     Status status = composite_refresh(instance);
-    if (status == STATUS_OK) status = motors_check(instance);
+    if (status == STATUS_OK) status = actions_check(instance);
     *states_changed = false;
     if (status != STATUS_OK) return status;
     changes_begin(instance);

@@ -7,11 +7,11 @@
 #include <math.h>
 #include <string.h>
 
+#include "actions.h"
 #include "changes.h"
 #include "field.h"
 #include "hand_over.h"
 #include "model.h"
-#include "motors.h"
 #include "variables.h"
 
 /* What a reference may stand for in a set of knowns or unknowns, as bits of (1 << role). Once initialisation has ended
@@ -60,7 +60,7 @@ static Status check_request(Instance *instance, const unsigned unknowns[], size_
     if (status == STATUS_OK) status = instance_check_attitude(instance);
     if (status == STATUS_OK) status = composite_refresh(instance);
     if (status == STATUS_OK) status = field_check(instance);
-    if (status == STATUS_OK) status = motors_check(instance);
+    if (status == STATUS_OK) status = actions_check(instance);
     if (status == STATUS_OK) composite_refresh_axes(instance);
     if (status == STATUS_OK) changes_mirror(instance);
     return status;

@@ -1,6 +1,6 @@
 /* What methods have in common that find the size of their sub-steps by an estimated error: dop853, split, taylor.
 
-   Needs of the model: ode; with wheels fastest_square, a bound of the rate. */
+   Needs of the model: ode; with wheels or jet damping fastest_square, a bound of the rate. */
 #include "estimated_steps.h"
 
 #include "model.h"
@@ -16,14 +16,14 @@ Status estimated_refuse_count(Instance *instance, const Progress *progress, doub
 }
 
 /* Below an angle that any tolerance allows nothing needs to be asked. The momentum of wheels turns a rate faster than the
-   body turns: stages far beyond that time would leave the range of doubles. */
+   body turns, and jet damping makes it decay: stages far beyond that time would leave the range of doubles. */
 double estimated_first_size(Instance *instance, const Progress *progress) {
     double rates[STATE_COUNT];
     instance_set_arguments(instance);
     instance->res[0] = rates;
     ode(instance->arg, instance->res, instance->iw, instance->w, 0);
     double speed = length_of(instance_x(instance) + 4) + sqrt(length_of(rates + 4));
-#ifdef NUTATES
+#ifdef BOUNDS_FIRST_SIZE
     double square;
     instance->res[0] = &square;
     fastest_square(instance->arg, instance->res, instance->iw, instance->w, 0);

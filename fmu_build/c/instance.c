@@ -12,10 +12,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "actions.h"
 #include "changes.h"
 #include "error_bound.h"
 #include "field.h"
-#include "motors.h"
 #include "variables.h"
 
 enum { MESSAGE_SIZE = 1024, LONGEST_NAME = 200 };
@@ -267,7 +267,7 @@ Status instance_exit_initialization(Instance *instance) {
     if (status == STATUS_OK) status = check_momenta(instance);
     if (status == STATUS_OK) status = composite_refresh(instance);
     if (status == STATUS_OK) status = field_check(instance);
-    if (status == STATUS_OK) status = motors_check(instance);
+    if (status == STATUS_OK) status = actions_check(instance);
     if (status != STATUS_OK) return status;
     changes_start(instance);
     bound_start(instance);

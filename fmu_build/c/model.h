@@ -5,7 +5,7 @@
    Arguments and results, with their counts; axes are body axes:
      p [INPUT_P_COUNT]    inputs that shape the composite, directions scaled
      k [INPUT_K_COUNT]    motion at contact: m/s, rad/s
-     u [INPUT_U_COUNT]    torques, N.m, and forces, N
+     u [INPUT_U_COUNT]    torques, N.m, forces, N, and flows, kg/s
      x [STATE_COUNT]      attitude w, x, y, z; angular velocity, rad/s; momenta of wheels, N.m.s
      z [STATE_COUNT]      states of model exchange: x, or angular momentum, N.m.s, in place of angular velocity
      c, d [COMPOSITE_COUNT]  composites
@@ -62,6 +62,7 @@ int contact_velocity_reverse(const double **arg, double **res, int *iw, double *
 int fastest_square(const double **arg, double **res, int *iw, double *w, int mem);    /* x, u, c -> rad2/s2 */
 int step(const double **arg, double **res, int *iw, double *w, int mem);              /* x, u, c, h -> x, error */
 int by_torque(const double **arg, double **res, int *iw, double *w, int mem);         /* u, c -> rad/s2 */
+int damping(const double **arg, double **res, int *iw, double *w, int mem);           /* u, c -> 1/s, column by column */
 int held(const double **arg, double **res, int *iw, double *w, int mem);              /* x, u, c -> see taylor_series.h */
 int rounding(const double **arg, double **res, int *iw, double *w, int mem);          /* x, u, c, h -> rad */
 int bound_step(const double **arg, double **res, int *iw, double *w, int mem);        /* x, u, c, a, s, b -> b */

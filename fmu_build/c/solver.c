@@ -7,11 +7,11 @@
 
 #include <string.h>
 
+#include "actions.h"
 #include "composite.h"
 #include "error_bound.h"
 #include "field.h"
 #include "model.h"
-#include "motors.h"
 #include "variables.h"
 
 /* Of the span from startTime to stopTime. */
@@ -91,7 +91,7 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
     Status status = check_times(instance, time, h);
     if (status == STATUS_OK) status = composite_refresh(instance);
     if (status == STATUS_OK) status = field_check(instance);
-    if (status == STATUS_OK) status = motors_check(instance);
+    if (status == STATUS_OK) status = actions_check(instance);
     if (status != STATUS_OK) return status;
     field_begin(instance);
     Progress progress;

@@ -29,6 +29,9 @@ typedef struct {
 
     /* where series are followed */
     double acceleration[3]; /* rad/s2, by the torque */
+#ifdef FLOW_COUNT
+    double damping[9];      /* 1/s, of jet damping, see taylor_series.h */
+#endif
     double rest[3];         /* rad/s, what the angular velocity lacks by rounding: carried on (compensated sum) */
     double drift;           /* rad, by other rounding of the angular velocity, at the step's end; part of error */
 } Progress;

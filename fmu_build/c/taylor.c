@@ -2,7 +2,8 @@
    error.
 
    Needs of the model: by_torque, the acceleration by torque, and the map in a that says what the law's products are;
-   with wheels held, the momentum that they hold and its rate, and what estimated_steps.c needs. */
+   with wheels held, the momentum that they hold and its rate, with jet damping damping, what it makes of a rate, and
+   with either what estimated_steps.c needs. */
 #include <string.h>
 
 #include "composite.h"
@@ -54,6 +55,10 @@ static void begin_series(Instance *instance, Progress *progress) {
     instance->arg[1] = instance->now.c;
     instance->res[0] = progress->acceleration;
     by_torque(instance->arg, instance->res, instance->iw, instance->w, 0);
+#ifdef FLOW_COUNT
+    instance->res[0] = progress->damping;
+    damping(instance->arg, instance->res, instance->iw, instance->w, 0);
+#endif
     progress->next_size = estimated_first_size(instance, progress);
 }
 
@@ -72,6 +77,9 @@ Status solver_sub_step(Instance *instance, Progress *progress) {
     held(instance->arg, instance->res, instance->iw, instance->w, 0);
     series.held = stored;
     series.response = &instance->now.a[AXES_RESPONSE];
+#endif
+#ifdef FLOW_COUNT
+    series.damping = progress->damping;
 #endif
 #if FIELD
     series.field = field_of(instance);

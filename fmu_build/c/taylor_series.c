@@ -102,6 +102,29 @@ static void begin_stored(const double map[], double step, Series *series) {
 
 #endif
 
+#ifdef FLOW_COUNT
+
+/* Adds to coefficient k + 1 of the rates the part of jet damping, the rates being known up to k. */
+static void add_damped(int k, Series *series) {
+    const double *w = series->rates[k];
+    for (int i = 0; i < 3; i++) {
+        const double *row = series->damped[i];
+        series->rates[k + 1][i] -= (row[0] * w[0] + row[1] * w[1] + row[2] * w[2]) / (k + 1);
+    }
+}
+
+static void begin_damped(const double map[], double step, Series *series) {
+    double half[3][3]; /* half[j]: column j in the axes of the map */
+    for (int j = 0; j < 3; j++) from_body(map, series->damping + 3 * j, half[j]);
+    for (int i = 0; i < 3; i++) {
+        const double row[3] = {step * half[0][i], step * half[1][i], step * half[2][i]};
+        from_body(map, row, series->damped[i]);
+    }
+    add_damped(0, series);
+}
+
+#endif
+
 #if FIELD
 
 /* Begins the series of position and velocity, and adds the gradient's part to the first change of the rates. */
@@ -161,6 +184,9 @@ void taylor_series(const double x[7], const double acceleration[3], const double
 #ifdef AXES_RESPONSE
     if (GYROSCOPIC) begin_stored(map, step, series);
 #endif
+#ifdef FLOW_COUNT
+    begin_damped(map, step, series);
+#endif
 #if FIELD
     Gradient gradient;
     begin_field(x, map, step, series, &gradient);
@@ -184,6 +210,9 @@ void taylor_series(const double x[7], const double acceleration[3], const double
         if (k + 1 < order) spread(p, v, step, ones[k].of, others[k].of);
 #ifdef AXES_RESPONSE
         if (GYROSCOPIC) add_stored(k, step, series);
+#endif
+#ifdef FLOW_COUNT
+        add_damped(k, series);
 #endif
 #if FIELD
         follow_field(k, step, series, &gradient);

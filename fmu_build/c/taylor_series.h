@@ -14,6 +14,9 @@
    held     : their momentum S at x [N m s] and its rate [N m], which is constant, both in body axes
    response : in the axes of the map, the acceleration by a torque over that torque [1/(kg m2)]
    stored   : S and its gain over the step, in the axes of the map
+   With jet damping, where damping is set before the series are found:
+   damping  : the matrix that takes the rate to the opposite of the acceleration by it [1/s], column by column, body axes
+   damped   : the same times the step, in the axes of the map, row by row
    In a field of gravity, where field and gradient are set before the series are found:
    field            : position [m] and velocity [m/s] from the attracting centre at x, inertial axes
    gradient         : the map of products of the direction to the acceleration, in the axes of the map
@@ -25,6 +28,10 @@ typedef struct {
 #ifdef AXES_RESPONSE
     const double *held, *response;
     double stored[2][3];
+#endif
+#ifdef FLOW_COUNT
+    const double *damping;
+    double damped[3][3];
 #endif
 #if FIELD
     const double *field, *gradient;

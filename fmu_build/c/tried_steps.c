@@ -1,7 +1,7 @@
 /* Sub-steps of methods that try a size and take a shorter one where the estimated error exceeds its share of the
    tolerance: dop853 and split, whose files say what one is.
 
-   Needs of the model: step, one step and the estimate of its error; with wheels what estimated_steps.c needs. */
+   Needs of the model: step, one step and the estimate of its error; with wheels or jet damping what estimated_steps.c needs. */
 #include "tried_steps.h"
 
 #include "model.h"

@@ -8,11 +8,11 @@
 #include <math.h>
 #include <string.h>
 
+#include "actions.h"
 #include "changes.h"
 #include "field.h"
 #include "hand_over.h"
 #include "model.h"
-#include "motors.h"
 
 /* Squares of the attitude's length beyond which it cannot be brought to unit length. */
 static const double SMALLEST_SQUARE = 1e-200;
@@ -94,7 +94,7 @@ static Status prepare(Instance *instance, unsigned wanted) {
     if (status == STATUS_OK && (wanted & FOLLOWS_FIELD)) status = field_check(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_OUTPUTS)) status = refresh_outputs(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_RATES)) status = field_check(instance);
-    if (status == STATUS_OK && (wanted & FOLLOWS_RATES)) status = motors_check(instance);
+    if (status == STATUS_OK && (wanted & FOLLOWS_RATES)) status = actions_check(instance);
     if (status == STATUS_OK && (wanted & FOLLOWS_RATES)) status = refresh_rates(instance);
     return status;
 }

@@ -17,6 +17,7 @@ from fmu_build.document.accuracy_text import accuracy_text
 from fmu_build.document.rotation_text import (
     energy_and_momentum,
     gradient_text,
+    jets_text,
     law_equation,
     law_text,
     what_changes_keep,
@@ -58,6 +59,9 @@ OF_WHEELS = (
     "torque of its motor must be 0;</li>\n"
 )
 """What is refused where there are wheels, HTML."""
+
+OF_FLOWS = "<li>a flow must not be negative;</li>\n"
+"""What is refused where propellant leaves, HTML."""
 
 ROLE_TITLES: dict[Role, tuple[str, str]] = {
     "time": ("Independent variable", ""),
@@ -106,7 +110,7 @@ def page(
         variables=_variables(entries),
         law=escape(rotation.law),
         law_equation=law_equation(scene),
-        gravity=wheels_text(scene) + gradient_text(scene),
+        gravity=wheels_text(scene) + jets_text(scene) + gradient_text(scene),
         moments=energy_and_momentum(scene),
         changes=what_changes_keep(scene),
         law_text=law_text(scene),
@@ -114,8 +118,17 @@ def page(
         propagator_text=description(scene),
         accuracy="" if evidence is None else accuracy_text(evidence),
         definite="" if rotation.law == "none" else " and positive definite",
-        nearest=(OF_WHEELS if scene.wheels else "") + (NEAREST if gradient_text(scene) else ""),
+        nearest="".join(text for text, holds in _more_refused(scene) if holds),
         status=VERSIONS[fmi].refusal,
+    )
+
+
+def _more_refused(scene: Scene) -> tuple[tuple[str, bool], ...]:
+    """Returns what is refused in some scenes, HTML, and whether it is in this one."""
+    return (
+        (OF_WHEELS, bool(scene.wheels)),
+        (OF_FLOWS, bool(scene.inputs.flow)),
+        (NEAREST, bool(gradient_text(scene))),
     )
 
 
@@ -219,9 +232,11 @@ def _ports(scene: Scene) -> str:
 
 
 def _points(scene: Scene) -> str:
-    """Returns the table of points where forces act; nothing where there are none."""
-    rows = [(name, scene.point(name).position) for name in scene.inputs.force]
-    caption = "Points where forces act, in the axes of their vessels"
+    """Returns the table of points where forces act or propellant leaves; nothing where there are none."""
+    forces, flows = scene.inputs.force, scene.inputs.flow
+    rows = [(name, scene.point(name).position) for name in dict.fromkeys((*forces, *flows))]
+    means = [text for text, names in (("forces act", forces), ("propellant leaves", flows)) if names]
+    caption = f"Points where {' or '.join(means)}, in the axes of their vessels"
     return table(caption, ("point", "position [m]"), rows) if rows else ""
 
 

@@ -1,9 +1,10 @@
 """The flight of the reference result: how its inputs move, and what comes of them, by a scene's equations.
 
 Fifty communication steps from the scene's start. Masses lose up to a tenth within their range, unless that
-would change the rate; the torque grows to what would double the rate at the start, or give 0.01 rad/s; one
-dock with an input switches after a third of the time, and back after two thirds, with a rate at contact of a
-tenth of the body's; in a field of gravity the body goes on about the centre, its inputs having a row for each
+would change the rate; flows of propellant grow from nothing to what in that time takes a tenth of their
+vessel; the torque grows to what would double the rate at the start, or give 0.01 rad/s; one dock with an
+input switches after a third of the time, and back after two thirds, with a rate at contact of a tenth of the
+body's; in a field of gravity the body goes on about the centre, its inputs having a row for each
 communication point; everything else stays.
 """
 
@@ -21,7 +22,7 @@ from supervessel.composite.docks import switchable
 from supervessel.equations import Equations, composite_slices, p_start
 from supervessel.orbit import gravity_inputs, orbit_problem, two_body
 from supervessel.rotation.changes import followed
-from supervessel.scene.inputs import CONTACT_RATE, MASS, TORQUE, part_of
+from supervessel.scene.inputs import CONTACT_RATE, FLOW, MASS, TORQUE, part_of, vessel_of
 from supervessel.scene.schema import Dock, Mount, Scene
 from supervessel.scene.variables import InputVariable
 
@@ -31,6 +32,8 @@ SWITCHES = (STEPS // 3, 2 * STEPS // 3)
 DEFAULT_STEP = 0.1  # s
 MOST_SUB_STEPS = 2000
 ATTEMPTS = 8
+LEFT = 0.9
+"""What is left at the end of a mass that an input gives."""
 CONTACT = 0.1
 """Rate with which a part docks, over the body's."""
 
@@ -228,7 +231,9 @@ def _last_inputs(model: Equations, inputs: Sequence[InputVariable], first: Array
     for variable, start in zip(inputs, first, strict=True):
         value = float(start)
         if variable.kind is MASS and scene.keeps["mass"] == "rate":
-            value = max(0.9 * value, variable.low or 0.0)
+            value = max(LEFT * value, variable.low or 0.0)
+        elif variable.kind is FLOW:
+            value = _within(variable, (1.0 - LEFT) * scene.vessels[vessel_of(variable.owner)].mass / duration)
         elif variable.kind is TORQUE and model.plan.method is not None:  # else free motion alone is possible
             value = _within(variable, smallest * rate / duration)
         elif variable.kind is CONTACT_RATE:

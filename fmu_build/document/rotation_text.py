@@ -60,6 +60,19 @@ WHEELS = (
 )
 """What the page says of wheels, HTML."""
 
+CENTRE = "<i>\N{GREEK SMALL LETTER RHO}</i>"
+
+JETS = (
+    "<p>Propellant that leaves a vessel at the rate <i>f</i> takes angular momentum along (jet damping). To "
+    f"<i>M</i> it adds {MINUS} {SUM} <i>f K ω</i>, with</p>\n"
+    f'<p class="equation"><i>K</i> = ⌊<i>r</i>⌋ {MINUS} ⌊{CENTRE}⌋ {MINUS} <i>S</i>, &#160;\n'
+    f"⌊<i>d</i>⌋ = |<i>d</i>|<sup>2</sup> <i>E</i> {MINUS} <i>d d</i><sup>T</sup></p>\n"
+    f"<p>where <i>r</i> and {CENTRE} are the nozzle and the vessel's centre of mass from the barycentre, and "
+    "<i>S</i> is the vessel's inertia tensor over its mass. The vessel's mass, an input, is to fall by its "
+    "flows: nothing checks that it does. Thrust is another input.</p>\n"
+)
+"""What the page says of jet damping, HTML."""
+
 DIAGONAL = "\n<p><i>J</i> is the diagonal there too, as the law has it.</p>"
 
 KEPT_BY = {
@@ -114,6 +127,11 @@ def gradient_text(scene: Scene) -> str:
 def wheels_text(scene: Scene) -> str:
     """Returns how wheels enter the equations, or "" without wheels."""
     return WHEELS if scene.wheels else ""
+
+
+def jets_text(scene: Scene) -> str:
+    """Returns what flows of propellant do, or "" without them."""
+    return JETS if scene.inputs.flow else ""
 
 
 def energy_and_momentum(scene: Scene) -> str:

@@ -8,7 +8,7 @@ from fmu_build.flight.experiment import acts, at_start, experiment_of
 from supervessel.loading import parse_scene
 from supervessel.rotation.propagators import PROPAGATORS, plan_of, stepping
 from supervessel.rotation.propagators.method import Propagator
-from supervessel.scene.inputs import Change, by_name, listed, part_of, vessel_of
+from supervessel.scene.inputs import FLOW, MASS, Change, by_name, listed, part_of, vessel_of
 from supervessel.scene.numbers import LEAST_TOLERANCE
 from supervessel.scene.outputs import is_accelerated
 from supervessel.scene.schema import Law, Scene
@@ -80,7 +80,7 @@ class Choice:
 def laws_of(scene: Scene) -> list[Law]:
     """Returns the laws that make sense in a scene, cheapest first."""
     placed = scene.inputs.gravity and any(map(is_accelerated, scene.outputs.names))
-    moves = scene.inputs.motion or scene.wheels or placed
+    moves = _is_never_free(scene) or placed
     return [law for law in LAWS_TRIED if not (law == "none" and moves)]
 
 
@@ -126,7 +126,12 @@ def is_free(scene: Scene, model: Model) -> bool:
         if known[name].part != "field" and len({value for _, value in rows}) > 1
     ]
     frozen = all(change != "" and change == model.frozen for change in moved)
-    return frozen and not is_pushed(scene, model) and not scene.inputs.motion and not scene.wheels
+    return frozen and not is_pushed(scene, model) and not _is_never_free(scene)
+
+
+def _is_never_free(scene: Scene) -> bool:
+    """Whether a scene has what no method of free motion alone is let know, used or not."""
+    return bool(scene.inputs.motion or scene.wheels or scene.inputs.flow)
 
 
 def is_pushed(scene: Scene, model: Model) -> bool:
@@ -154,7 +159,7 @@ def by_tolerance(scene: Scene, model: Model, *, quick: bool) -> Iterator[Choice]
         *(kicked(scene, model) if torque else ()),
     ):
         yield from (Choice(model, name, None, tolerance) for tolerance in tolerances)
-    if not torque and not scene.inputs.motion and not scene.wheels:
+    if not torque and not _is_never_free(scene):
         yield from (Choice(model, name) for name in always_free())
 
 
@@ -234,7 +239,7 @@ def _freeze(raw: dict[str, Any], change: str, start: Mapping[str, float]) -> Non
     frozen = {
         name: (kind, owner, element)
         for kind, owner in listed(inputs)
-        if kind.change == change
+        if kind.change == change or (kind is FLOW and change == MASS.change)  # a mass that stays has no flow
         for element, name in enumerate(kind.names(owner))
     }
     for name, value in start.items():

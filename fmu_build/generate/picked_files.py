@@ -27,15 +27,18 @@ BOUND = frozenset({"error_bound"})
 STAGES = frozenset({"stages"})
 HAND_OVER = frozenset({"hand_over"})
 MOTORS = frozenset({"motors"})
+FLOWS = frozenset({"flows"})
 FIELD = frozenset({"field"})
 FIELD_SERIES = frozenset({"gradient_series"})
 STEPS = frozenset(WHEN_FREE.values()).union(*(method.c_files for method in PROPAGATORS.values()))
 
-PICKED = LOOP | BOOLEANS | CHANGES | BOUND | STAGES | HAND_OVER | MOTORS | FIELD | FIELD_SERIES | STEPS
+PICKED = (
+    LOOP | BOOLEANS | CHANGES | BOUND | STAGES | HAND_OVER | MOTORS | FLOWS | FIELD | FIELD_SERIES | STEPS
+)
 """Names, without .c and .h, of the files that are not in every FMU, HEADERS excepted."""
 
 HEADERS = frozenset(
-    {"changes.h", "error_bound.h", "docks.h", "booleans.h", "motors.h", "field.h", "hand_over.h"}
+    {"changes.h", "error_bound.h", "docks.h", "booleans.h", "motors.h", "flows.h", "field.h", "hand_over.h"}
 )
 """Headers with such names that are in every FMU, because other files include them."""
 
@@ -62,6 +65,7 @@ def picked_files(model: Equations, has_loop: bool) -> frozenset[str]:
         | _for_field(model)
         | (HAND_OVER if model.hand_over is not None else frozenset())
         | (MOTORS if "MOTOR_COUNT" in wheel_constants(model) else frozenset())
+        | (FLOWS if model.resolved.scene.inputs.flow else frozenset())
         | (LOOP if has_loop else frozenset())
     )
 

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import casadi as ca
 
 from fmu_build.generate.change_tables import change_constants
+from fmu_build.generate.flow_tables import flow_constants
 from fmu_build.generate.vessel_loop import LoopTables, loop_constants
 from fmu_build.generate.wheel_tables import wheel_constants
 from fmu_build.interface.model_description import LOG_CATEGORIES, tells_accuracy
@@ -53,7 +54,9 @@ def scene_header(
     macros = {
         "AXES_COUNT": model.axes.numel_out(0),
         **change_constants(model),
+        **_rate_bound(model),
         **wheel_constants(model),
+        **flow_constants(model),
         **loop_constants(loop),
         **_bound(model),
         **_field(model),
@@ -201,6 +204,12 @@ def _field(model: Equations) -> dict[str, object]:
         found["GRADIENT_COUNT"] = 3 if place.stop - place.start == 3 else 6
         found["AXES_GRADIENT"] = place.start
     return found
+
+
+def _rate_bound(model: Equations) -> dict[str, int]:
+    """Returns BOUNDS_FIRST_SIZE, 1, where wheels or jet damping change a rate faster than the body turns."""
+    scene = model.resolved.scene
+    return {"BOUNDS_FIRST_SIZE": 1} if scene.wheels or scene.inputs.flow else {}
 
 
 def _limits(scene: Scene) -> dict[str, str]:

@@ -103,12 +103,13 @@ def loop_tables(model: Equations) -> LoopTables | None:
 def _suits_loop(model: Equations) -> bool:
     """Whether the composite is long enough for a loop, and made of steps that the loop has.
 
-    The loop has no docks that open, no ports that move, no forces at points, no wheels, and it keeps nothing
-    of single vessels, points and docks: that is for straight code alone.
+    The loop has no docks that open, no ports that move, no forces or flows at points, no wheels, and it keeps
+    nothing of single vessels, points and docks: that is for straight code alone.
     """
     inputs = model.resolved.scene.inputs
     resolved = model.resolved
-    beyond = inputs.docked or inputs.motion or inputs.force or inputs.vessel_torque or resolved.scene.wheels
+    acts = inputs.force or inputs.vessel_torque or inputs.flow
+    beyond = inputs.docked or inputs.motion or acts or resolved.scene.wheels
     shown = resolved.vessels_shown or resolved.points_shown or resolved.docks_shown
     return not (beyond or shown or model.composite.n_instructions() <= LONGEST_CODE)
 

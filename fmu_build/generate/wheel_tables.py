@@ -7,14 +7,11 @@ from supervessel.scene.inputs import vessel_of
 def wheel_constants(model: Equations) -> dict[str, int]:
     """Returns macros about wheels, each only where a scene needs it.
 
-    NUTATES       : 1 if there are wheels, whose momentum turns a rate faster than the body itself turns
     MOTOR_COUNT   : number of rows of MOTORS, see fmu_build/c/motors.h
     AXES_RESPONSE : with Taylor steps: place in a of the response to a torque, see taylor_series.h there; 0
                     under a law without products, which does not ask for it
     """
     rows, found = _rows(model), dict[str, int]()
-    if model.resolved.scene.wheels:
-        found["NUTATES"] = 1
     if rows:
         found["MOTOR_COUNT"] = len(rows)
     if any(function.name() == "held" for function in model.steps.propagation):

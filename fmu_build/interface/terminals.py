@@ -80,6 +80,7 @@ CONNECTIONS: dict[str, Connection | None] = {
     "wheel": Connection("motor", "torque of the motor of wheel {owner}, along its axis", "{owner}.motor"),
     "force": Connection("force", "external force at {owner}, axes of its vessel"),
     "vessel_torque": Connection("torque", "external torque on {owner}, its axes", "{owner}.torque"),
+    "flow": Connection("flow", "propellant that leaves {vessel} through {owner}", "{owner}.flow"),
     "gravity": Connection("orbit", "place and velocity from the attracting centre, inertial axes", "gravity"),
     "torque": Connection("torque", "external torque about the barycentre, body axes", "torque"),
 }

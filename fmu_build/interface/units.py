@@ -29,6 +29,7 @@ UNITS = {
     "s": Unit({"s": 1}, "Time", "Time"),
     "1/s": Unit({"s": -1}, "QuaternionRate", "Frequency"),
     "kg": Unit({"kg": 1}, "Mass", "Mass"),
+    "kg/s": Unit({"kg": 1, "s": -1}, "MassFlow", "MassFlowRate"),
     "m": Unit({"m": 1}, "Length", "Length"),
     "m/s": Unit({"m": 1, "s": -1}, "Velocity", "Velocity"),
     "m/s2": Unit({"m": 1, "s": -2}, "Acceleration", "Acceleration"),

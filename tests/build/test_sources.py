@@ -22,6 +22,7 @@ from fmu_build.generate.picked_files import PICKED
 from fmu_build.generate.picked_files import STEPS as OF_STEPS
 from fmu_build.generate.sources import LAYER, layer_files, source_file_names, source_files
 from fmu_build.storage.cache import cache_folder
+from jets.scenes import STACK
 from supervessel.rotation.propagators import PROPAGATORS
 from support import ISS_DG, OK, STEADY, Instance, body, built, scene, variant
 from support.costs import station
@@ -166,6 +167,7 @@ SCENES = {
         },
     ),
     "wheels": CARRIER,
+    "flows": variant(STACK, {"rotation.propagator": "taylor"}),
     "field": variant(body(propagator="taylor"), {"inputs.gravity": True, "gravity": {"mu": EARTH, **ORBIT}}),
     "bounded": variant(body(propagator="rk4"), {"outputs.names": ["error_bound"]}),
     "many vessels": station(60, [f"v{i}" for i in range(60)]),

@@ -50,6 +50,7 @@ PLACE: Raw = {"position": [0.0, 0.0, 6.8e6], "velocity": [7.6e3, 0.0, 0.0]}
 FEATURES: dict[str, Raw] = {
     "nothing acts": {},
     "torque, forces": {"inputs": {"torque": True, "force": ["A.jet"], "vessel_torque": ["B"]}},
+    "flows": {"inputs": {"mass": ["A"], "flow": ["A.jet"]}},
     "gravity": {"inputs": {"gravity": True}, "gravity": {"mu": MU} | PLACE},
     "wheels": {"vessels": WHEELED, "inputs": {"wheel": ["A.w"]}},
     "ports that move": {"inputs": {"pose": ["B.q"], "motion": ["B.q"]}},
@@ -115,10 +116,12 @@ def asking(feature: str) -> Raw:
     """Returns a scene with a feature that states an accuracy, and ranges for it."""
     raw = scene_with(feature, "tensor", "auto")
     inputs = raw.get("inputs", {})
-    numbers = [
-        group for group, (kind, _) in by_group(inputs).items() if not kind.boolean and kind.part != "field"
-    ]
-    ranges = {"range": {group: [-1.0, 1.0] for group in numbers}} if numbers else {}
+    numbers = {
+        group: [-1.0 if kind.lowest is None else kind.lowest, 1.0]
+        for group, (kind, _) in by_group(inputs).items()
+        if not kind.boolean and kind.part != "field"
+    }
+    ranges = {"range": numbers} if numbers else {}
     asked = {"attitude": 1e-3, "horizon": 100.0, "step": 1.0}
     raw |= {"inputs": inputs | ranges, "accuracy": asked, "rotation": SPIN}
     return raw if "gravity" not in raw else raw | {"gravity": {"mu": MU}, **on_orbit()}

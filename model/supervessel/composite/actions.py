@@ -1,4 +1,4 @@
-"""Single vessels of the composite in CasADi symbols: forces and torques that act on them, and their outputs.
+"""Single vessels of the composite in CasADi symbols: what acts on them, and their outputs.
 
 Root axes are the root vessel's; body axes have the same directions, with the origin at the barycentre.
 """
@@ -10,13 +10,13 @@ import casadi as ca
 import numpy as np
 
 from supervessel.composite.bodies import Lookup, Placed, placed_vessels, vessel_body
-from supervessel.composite.inertia import Body, from_upper_triangle, offset_tensor, upper_triangle
+from supervessel.composite.inertia import Body, from_upper_triangle, offset_tensor, symmetric, upper_triangle
 from supervessel.composite.poses import Pose, constant, from_anchor
 from supervessel.composite.resolved import ResolvedScene
 from supervessel.composite.wheels import free_inertia, wheels_on, without_locked
 from supervessel.layout import slices_of
 from supervessel.rotation.attitude import quaternion, to_inertial
-from supervessel.scene.inputs import FORCE, TORQUE, WHEEL_TORQUE, InputKind, vessel_of
+from supervessel.scene.inputs import FLOW, FORCE, TORQUE, WHEEL_TORQUE, InputKind, vessel_of
 from supervessel.scene.schema import Scene
 from supervessel.scene.variables import InputVariable
 
@@ -136,12 +136,12 @@ def _on_vessels(resolved: ResolvedScene, vessels: Set[str]) -> list[tuple[int, I
 def _acting(resolved: ResolvedScene) -> list[tuple[int, InputVariable]]:
     """Returns of each force or torque on the body its place in u and the variable of its first element.
 
-    Motors of wheels are none: see `composite.wheels.motor_torques`.
+    Motors of wheels are none, see `composite.wheels.motor_torques`, nor are flows, see `jet_parts`.
     """
     return [
         (place, variable)
         for place, variable in enumerate(resolved.acting)
-        if variable.element == 0 and variable.kind is not WHEEL_TORQUE
+        if variable.element == 0 and variable.kind not in (WHEEL_TORQUE, FLOW)
     ]
 
 
@@ -175,6 +175,76 @@ def net_force(resolved: ResolvedScene, parts: Mapping[str, ca.SX], u: ca.SX) -> 
 def _matrix(numbers: ca.SX, number: int) -> ca.SX:
     """Returns one of the matrices, (3, 3), that `numbers` holds column by column, counted from 0."""
     return ca.reshape(numbers[9 * number : 9 * number + 9], 3, 3)
+
+
+def jet_parts(resolved: ResolvedScene, lookup: Lookup, centre: ca.SX) -> dict[str, ca.SX]:
+    """Returns the part of c by which flows of propellant act, none in a scene without them.
+
+    centre : barycentre, (3,) [m], root axes, from the root's anchor
+
+    Propellant that leaves vessel V at the rate f [kg/s] through a nozzle at r from the barycentre acts on the
+    body as the torque -f K omega, K = off(r) - off(rho) - S: rho is V's centre of mass from the barycentre, S
+    its tensor over its mass about that, off(d) = |d|^2 E - d d^T; all in body axes.
+    Source: [EQ] Jet damping, eq. (28).
+
+    "jets" : (6 n,) [m2], the matrix K of one flow after the other, xx, yy, zz, xy, xz, yz; zeros while docks
+             do not hold its vessel to the root
+    """
+    flows = resolved.scene.inputs.flow
+    if not flows:
+        return {}
+    where = placed_vessels(resolved, lookup, {vessel_of(name) for name in flows})
+    return {"jets": ca.vertcat(*(_jet(resolved, lookup, name, where, centre) for name in flows))}
+
+
+def _jet(resolved: ResolvedScene, lookup: Lookup, name: str, where: Placed, centre: ca.SX) -> ca.SX:
+    """Returns K, (6,) [m2], of the flow through the point called "vessel.point".
+
+    where, centre : see `jet_parts`
+    """
+    scene, vessel = resolved.scene, vessel_of(name)
+    pose, attached = where[vessel]
+    specific = vessel_body(scene, vessel, lookup, pose, ca.SX(1.0))
+    nozzle = from_anchor(scene, vessel, scene.point(name).position)
+    of_vessel = from_anchor(scene, vessel, scene.vessels[vessel].centre_of_mass)
+    own = upper_triangle(_lever(specific, pose.rotation @ constant(nozzle - of_vessel), centre))
+    return own if attached is None else attached * own
+
+
+def _lever(specific: Body, outward: ca.SX, centre: ca.SX) -> ca.SX:
+    """Returns K, (3, 3) [m2].
+
+    specific : the vessel with a mass of 1 kg, root axes
+    outward  : e, the nozzle from the vessel's centre of mass, (3,) [m], root axes
+    centre   : barycentre, (3,) [m], root axes
+    With s = rho + r, off(r) - off(rho) is e . s E - (e s^T + s e^T)/2: no squares are subtracted, of arms
+    that are long where the vessel is far from the barycentre.
+    """
+    e = outward
+    s = 2.0 * (specific.centre - centre) + e
+
+    def element(i: int, j: int) -> ca.SX:
+        if i != j:
+            return -0.5 * (e[i] * s[j] + s[i] * e[j]) - specific.inertia[i, j]
+        one, other = (k for k in range(3) if k != i)
+        return (e[one] * s[one] + e[other] * s[other]) - specific.inertia[i, i]
+
+    return symmetric(element)
+
+
+def jet_damping(resolved: ResolvedScene, parts: Mapping[str, ca.SX], u: ca.SX) -> ca.SX | None:
+    """Returns D, (3, 3) [N m s], body axes, whose torque is -D omega; None in a scene without flows.
+
+    parts : the parts of c by name, see `jet_parts`
+    u     : the inputs that act, in the order of `ResolvedScene.acting`
+    """
+    places = [place for place, variable in enumerate(resolved.acting) if variable.kind is FLOW]
+    if not places:
+        return None
+    total = ca.SX.zeros(6)
+    for number, place in enumerate(places):
+        total = total + u[place] * parts["jets"][6 * number : 6 * number + 6]
+    return from_upper_triangle(total)
 
 
 SIZES: Mapping[str, int] = {

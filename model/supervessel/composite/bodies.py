@@ -317,10 +317,10 @@ def _moments(scene: Scene, name: str, lookup: Lookup, pmi: ca.SX) -> ca.SX:
     return ca.if_else(sum(closed[1:], closed[0]) > 0.5, orbiter_moments(pmi), pmi)
 
 
-def vessel_body(scene: Scene, name: str, lookup: Lookup, pose: Pose) -> Body:
-    """Returns a vessel as a body in the axes of its group."""
+def vessel_body(scene: Scene, name: str, lookup: Lookup, pose: Pose, mass: ca.SX | None = None) -> Body:
+    """Returns a vessel as a body in the axes of its group; mass : [kg], instead of its own."""
     vessel = scene.vessels[name]
-    mass = lookup(f"{name}.mass", vessel.mass)
+    mass = lookup(f"{name}.mass", vessel.mass) if mass is None else mass
     if vessel.pmi is not None:
         pmi = lookup(f"{name}.pmi", vessel.pmi)
         specific_inertia = ca.diag(_moments(scene, name, lookup, pmi))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from supervessel.composite.actions import action_parts, vessel_parts
+from supervessel.composite.actions import action_parts, jet_parts, vessel_parts
 from supervessel.composite.bodies import composite_body, energy_of_motion, lookup_in
 from supervessel.composite.docks import alone_as_given
 from supervessel.composite.inertia import Body, ldl, ldl_inverse, upper_triangle
@@ -100,6 +100,7 @@ def composite_parts(resolved: ResolvedScene, p: ca.SX) -> dict[str, ca.SX]:
                     move relative to body axes, without what wheels would have of it if they were locked
     wheels, wheel_rates : see `composite.wheels.wheel_parts`
     moment, force : see `composite.actions.action_parts`
+    jets          : see `composite.actions.jet_parts`
     .NAME         : of the vessel NAME, see `composite.actions.vessel_parts`, of a point, see
                     `composite.shown.points.point_parts`, or of a dock, see `composite.shown.loads.load_parts`
     """
@@ -111,7 +112,8 @@ def composite_parts(resolved: ResolvedScene, p: ca.SX) -> dict[str, ca.SX]:
         parts["moving"] = energy_of_motion(resolved, lookup, body) - locked
     if body.velocity is not None and resolved.shows_velocity:
         parts["velocity"] = body.velocity
-    parts |= action_parts(resolved, lookup, body.centre) | vessel_parts(resolved, lookup, body)
+    parts |= action_parts(resolved, lookup, body.centre) | jet_parts(resolved, lookup, body.centre)
+    parts |= vessel_parts(resolved, lookup, body)
     parts |= point_parts(resolved, lookup, body) | load_parts(resolved, lookup, body.centre, wheels)
     return {name: ca.densify(part) for name, part in parts.items()}
 

@@ -178,8 +178,8 @@ def _ports(scene: Scene, vessel: DrawnVessel, R_root_vessel: Array, origin: Arra
 def _force_points(
     scene: Scene, vessel: DrawnVessel, R_root_vessel: Array, origin: Array
 ) -> Iterator[DrawnPoint]:
-    """Yields the points of a vessel where forces act, if near enough to be drawn."""
-    for name in scene.inputs.force:
+    """Yields the points of a vessel where forces act or propellant leaves, if near enough to be drawn."""
+    for name in dict.fromkeys((*scene.inputs.force, *scene.inputs.flow)):
         position = origin + R_root_vessel @ np.array(scene.point(name).position)
         if vessel_of(name) == vessel.name and _near(position):
             yield DrawnPoint(name, vessel, position)

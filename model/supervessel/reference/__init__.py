@@ -26,6 +26,7 @@ from supervessel.reference.attitude import attitude_dot, quaternion, rotation_ma
 from supervessel.reference.changes import at_contact, before_arrivals, change, stages
 from supervessel.reference.gravity import gravity_torque, orbit_dot
 from supervessel.reference.hand_over import barycentre_jumps, leaving_vessels
+from supervessel.reference.jets import jet_torque
 from supervessel.reference.laws import angular_acceleration, law_tensor
 from supervessel.reference.loads import loads, point_outputs
 from supervessel.reference.rotation import (
@@ -65,6 +66,7 @@ __all__ = [
     "gravity_torque",
     "inner_momentum",
     "internal_momentum",
+    "jet_torque",
     "joined",
     "law_tensor",
     "leaving_vessels",

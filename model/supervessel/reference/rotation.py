@@ -16,6 +16,7 @@ from supervessel.reference.assembly import (
 )
 from supervessel.reference.attitude import attitude_dot, quaternion, rotation_matrix
 from supervessel.reference.gravity import gravity_torque
+from supervessel.reference.jets import jet_torque
 from supervessel.reference.laws import angular_acceleration, law_tensor
 from supervessel.reference.wheels import Wheels, wheels_of
 from supervessel.scene.outputs import VESSEL_OUTPUTS
@@ -82,8 +83,8 @@ def ode(
     """Returns the rate of a scene's state (attitude, angular velocity, momenta of wheels), (7 + n,).
 
     torque : (3,) [N m], all that acts from outside, about the barycentre; by default what `values` say and
-             gravity's gradient. The motors of wheels are within.
-    Inputs are steady: between changes.
+             gravity's gradient. The motors of wheels, and flows of propellant, are within.
+    Inputs are steady, but for masses: they fall by the flows.
 
     Example:
         >>> reference.ode(scene, [1, 0, 0, 0, 0, 0.002, 0])[:4].tolist()
@@ -97,7 +98,7 @@ def ode(
         scene.rotation.law,
         composite(scene, values).inertia - own.inertia,
         omega,
-        np.asarray(torque, dtype=float) + own.reaction,
+        np.asarray(torque, dtype=float) + own.reaction + jet_torque(scene, omega, values),
         inner_momentum(scene, own, values),
     )
     return np.concatenate([attitude_dot(attitude, omega), acceleration, own.torques])

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from supervessel.composite.actions import torque_about_barycentre
+from supervessel.composite.actions import jet_damping, torque_about_barycentre
 from supervessel.composite.inertia import from_upper_triangle
 from supervessel.composite.resolved import ResolvedScene
 from supervessel.composite.wheels import (
@@ -67,6 +67,8 @@ class Dynamics:
     field       : the field of gravity whose gradient is a torque too; None where there is none
     excess      : by how much d|omega|/dt over |omega|^2 may exceed the law's `growth`; None: a rigid body's
                   moments never let it, see `composite.parts`
+    damping     : D, (3, 3) [N m s], of jet damping, whose torque is -D omega, the part of it that the law
+                  takes of J; None where there is none
     """
 
     law: RotationLaw
@@ -79,6 +81,7 @@ class Dynamics:
     wheels: SpunWheels | None = None
     field: Field | None = None
     excess: ca.SX | None = None
+    damping: ca.SX | None = None
 
     @property
     def turning(self) -> ca.SX:
@@ -103,6 +106,18 @@ class Dynamics:
         place = self.field.start[:3] if position is None else position
         return torque + self.field.torque(attitude, place)
 
+    @property
+    def slowing(self) -> ca.SX | None:
+        """The matrix, (3, 3) [1/s], that takes omega to the opposite of the acceleration by jet damping."""
+        if self.damping is None:
+            return None
+        columns = (self.law.acceleration(self.numbers, ca.SX.zeros(3), D) for D in ca.horzsplit(self.damping))
+        return ca.densify(ca.horzcat(*columns))
+
+    def damped(self, torque: ca.SX, omega: ca.SX) -> ca.SX:
+        """Returns a torque with that of jet damping added, (3,) [N m], body axes."""
+        return torque if self.damping is None else torque - self.damping @ omega
+
     def held_momentum(self, state: ca.SX) -> ca.SX | None:
         """Returns h + sum of h_w b_w, (3,) [N m s], body axes, where the law has a gyroscopic term.
 
@@ -119,27 +134,38 @@ class Dynamics:
 
         state    : q_inertial_body, (4,), omega, (3,) [rad/s], body axes, and h_w of n wheels [N m s]
         position : see `torque_at`
-        The law is given the torque M - sum of u_w b_w - omega x (h + sum of h_w b_w), and the tensor J - A.
+        The law is given the torque M - sum of u_w b_w - D omega - omega x (h + sum of h_w b_w), and the
+        tensor J - A.
         Source: [EQ] Conventions, eq. (2); Rotation: the four laws, eqs. (7) to (10); When masses or poses
-        change, eq. (11); Wheels, eqs. (16) and (17).
+        change, eq. (11); Wheels, eqs. (16) and (17); Jet damping, eq. (28).
         """
         attitude, omega, held = state[:4], state[4:7], self.held_momentum(state)
-        acting = self.torque_at(self.body_torque, attitude, position)
+        acting = self.damped(self.torque_at(self.body_torque, attitude, position), omega)
         torque = acting if held is None else acting - ca.cross(omega, held)
         acceleration = self.law.acceleration(self.numbers, omega, torque)
         rate = ca.vertcat(attitude_dot(attitude, omega), acceleration)
         return rate if self.wheels is None else ca.vertcat(rate, self.wheels.rate)
 
     def held_square(self, state: ca.SX, angle: float, push: Callable[[ca.SX], ca.SX]) -> ca.SX | None:
-        """Returns the square, [rad2/s2], of a bound of |(J - A)^-1 (omega x S)|/|omega| over a sub-step.
+        """Returns the square, [rad2/s2], of a bound of |(J - A)^-1 (omega x S + D omega)|/|omega| over a
+        sub-step.
 
         S     : `held_momentum` from state on, which motors change by |S'| <= |sum of u_w b_w|
         angle : largest angle of a sub-step [rad]; its length is at most this over the root of the result
         push  : a vector -> its length
-        None where S is None. With k = trace((J - A)^-1) the bound grows from k |S| to k (|S| + |S'| t), and
-        the square returned is R^2 = 2 k^2 |S|^2 + 2 k |S'| angle: at t = angle/R the bound's own square is at
-        most 2 k^2 |S|^2 + 2 (k |S'| angle)^2/R^2 <= R^2.
+        None where S and D are None. With k = trace((J - A)^-1) the bound without D grows from k |S| to
+        k (|S| + |S'| t), and its square is taken as R^2 = 2 k^2 |S|^2 + 2 k |S'| angle: at t = angle/R it is
+        at most 2 k^2 |S|^2 + 2 (k |S'| angle)^2/R^2 <= R^2. D adds |(J - A)^-1 D| to the bound, and
+        (a + b)^2 <= 2 (a^2 + b^2).
         """
+        held, slowing = self._held_square(state, angle, push), self.slowing
+        if slowing is None:
+            return held
+        own = ca.sumsqr(slowing)
+        return own if held is None else 2.0 * (held + own)
+
+    def _held_square(self, state: ca.SX, angle: float, push: Callable[[ca.SX], ca.SX]) -> ca.SX | None:
+        """Returns what `held_square` does without jet damping."""
         held = self.held_momentum(state)
         if self.wheels is None or held is None:
             return self.spin_square
@@ -158,7 +184,7 @@ class Dynamics:
         A law without gyroscopic term leaves omega x H out.
         """
         turning = ca.cross(omega, momentum) if self.law.gyroscopic_term else ca.SX.zeros(3)
-        return self.torque_at(self.torque, attitude) - turning
+        return self.damped(self.torque_at(self.torque, attitude), omega) - turning
 
 
 def dynamics_of(resolved: ResolvedScene, parts: Mapping[str, ca.SX], u: ca.SX) -> Dynamics:
@@ -169,6 +195,7 @@ def dynamics_of(resolved: ResolvedScene, parts: Mapping[str, ca.SX], u: ca.SX) -
     """
     law = LAWS[resolved.scene.rotation.law]
     spins = "momentum" in parts and law.gyroscopic_term
+    damping = jet_damping(resolved, parts, u)
     return Dynamics(
         law=law,
         numbers=parts["law"],
@@ -180,6 +207,7 @@ def dynamics_of(resolved: ResolvedScene, parts: Mapping[str, ca.SX], u: ca.SX) -
         wheels=_wheels(resolved, parts, u),
         field=field_of(resolved, parts, u),
         excess=parts.get("excess"),
+        damping=None if damping is None else law.keeping(damping),
     )
 
 

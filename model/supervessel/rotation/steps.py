@@ -30,9 +30,10 @@ class StepFunctions:
                      its third one is position [m] and velocity [m/s] afterwards, (6,)
     error_exponent : power of h with which the estimated error grows
     propagation    : the functions that the scene's co-simulation uses: of fastest_square and step as many as
-                     its method needs, with wheels always the first; by_torque: u, c -> angular acceleration
-                     by the torque alone, (3,) [rad/s2], for Taylor steps, and with wheels held, see
-                     `_held_function`; free_...: exact free motion, see `propagators.exact`; rounding: x, u,
+                     its method needs, with wheels or jet damping always the first; by_torque: u, c -> angular
+                     acceleration by the torque alone, (3,) [rad/s2], for Taylor steps, with jet damping
+                     damping: u, c -> `Dynamics.slowing`, and with wheels held, see `_held_function`;
+                     free_...: exact free motion, see `propagators.exact`; rounding: x, u,
                      c, h -> angle [rad] by which rounding of the tensor turns the body in h, where the scene
                      shows its error and the law has a gyroscopic term
     """
@@ -68,6 +69,7 @@ def step_functions(
         estimated,
         dynamics.field,
         dynamics.wheels,
+        dynamics.slowing,
     )
     method = plan.method or PROPAGATORS["dop853"]
     assert method.build is not None
@@ -82,9 +84,12 @@ def step_functions(
     ]
     rounding = [_rounding_function(motion, dynamics, symbols, h)] if shown and dynamics.law.products else []
     needed = {"angle": (rate_square, step), "error": (step,), "series": tuple(series)}
+    if motion.slowing is not None:
+        series.append(ca.Function("damping", [*symbols[1:]], [motion.slowing], ["u", "c"], ["slowing"]))
     if dynamics.wheels is not None:
-        held = _held_function(dynamics.wheels, symbols)
-        needed |= {"error": (step, rate_square), "series": (*series, held, rate_square)}
+        series.append(_held_function(dynamics.wheels, symbols))
+    if dynamics.wheels is not None or motion.slowing is not None:
+        needed |= {"error": (step, rate_square), "series": (*series, rate_square)}
     stepping = needed[plan.method.control] if plan.method else ()
     return StepFunctions(
         rate_square, longest, step, built.exponent, (*stepping, *_free_motion(plan, axes), *rounding)

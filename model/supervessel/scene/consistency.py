@@ -10,7 +10,7 @@ from typing import Any
 
 from supervessel.problems import listed, printable, quantity, toml_key
 from supervessel.rotation.propagators import PROPAGATORS
-from supervessel.scene.inputs import by_group, by_name
+from supervessel.scene.inputs import by_group, by_name, vessel_of
 from supervessel.scene.mending import mend
 from supervessel.scene.numbers import Vector, is_number, vector_length
 from supervessel.scene.outputs import is_accelerated
@@ -37,7 +37,7 @@ def consistency_problems(raw: Mapping[str, Any]) -> list[str]:
         for port, table in tables(vessel, "ports"):
             problems += direction_problems(f"{place}.ports.{toml_key(port)}", table)
     problems += [*_experiment(raw), *_accuracy(raw), *_ranges(raw), *_total_mass(raw), *_wheels(raw)]
-    problems += _accelerated(raw)
+    problems += [*_accelerated(raw), *_flow(raw)]
     return [*problems, *_gravity(raw), *_propagator(raw), *_changes(raw)]
 
 
@@ -257,8 +257,38 @@ def _accelerated(raw: Mapping[str, Any]) -> Iterator[str]:
         if moves:
             reason = "accelerations are not known where inputs.motion lists ports"
             yield f"outputs.names: {printable(name)}: {reason}; leave one of the two out"
+        if inputs.get("flow"):
+            reason = "where inputs.flow lists points, the momentum of the flow inside is not known"
+            yield f"outputs.names: {printable(name)}: {reason}; leave one of the two out"
         if still:
             yield f'outputs.names: {printable(name)}: rotation.law = "none" with inputs.gravity {NO_PLACE}'
+
+
+def _flow(raw: Mapping[str, Any]) -> Iterator[str]:
+    """Yields why the scene cannot have the flows of propellant that it lists."""
+    inputs, rotation = (raw.get(key, {}) for key in ("inputs", "rotation"))
+    if not (isinstance(inputs, Mapping) and isinstance(rotation, Mapping) and inputs.get("flow")):
+        return
+    flows, masses = (inputs.get(key) for key in ("flow", "mass"))
+    known = masses if isinstance(masses, list | tuple) else ()
+    for name in flows if isinstance(flows, list | tuple) else ():
+        if isinstance(name, str) and name.count(".") == 1 and vessel_of(name) not in known:
+            vessel = printable(vessel_of(name))
+            rule = f"{vessel} is not listed in inputs.mass; what flows out is to make its mass fall"
+            yield f"inputs.flow: {printable(name)}: {rule}"
+    if rotation.get("mass_change") == "momentum":
+        reason = "propellant that leaves takes momentum along, which the flow reckons with a kept rate"
+        yield f'rotation.mass_change = "momentum": must be "rate" where inputs.flow lists points: {reason}'
+    if rotation.get("law") == "none":
+        yield 'rotation.law = "none": knows no torque; a scene with inputs.flow needs any other law'
+    if inputs.get("motion"):
+        yield "inputs.motion: what a port's motion gives the flow is not known; leave it or inputs.flow out"
+    if raw.get("convention") == "orbiter":
+        yield 'convention = "orbiter": knows no jet damping; leave it or inputs.flow out'
+    if "accuracy" in raw:
+        yield "accuracy: the bounds by which it chooses know no flow; give law and propagator yourself"
+    if _shows_bound(raw):
+        yield "outputs.names: error_bound knows no flow; leave it out of a scene with inputs.flow"
 
 
 NO_PLACE = 'does not follow the place in the field; take another law, "decoupled" costs hardly more'

@@ -4,7 +4,7 @@ A new kind whose effect follows from inputs alone needs its row here, its key in
 equation: in `composite.bodies` if it shapes the composite, in `composite.actions` if it is a torque or a
 force. A torque that depends on attitude or rate besides needs `rotation.dynamics` (its rate of change),
 `rotation.steps` (how fast it grows), `twin.twin` (trim), and a word in the `suits` of propagators that cannot
-have it; gravity's gradient, `rotation.gravity`, is one.
+have it; gravity's gradient, `rotation.gravity`, and jet damping, `composite.actions.jet_parts`, are such.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -298,6 +298,19 @@ VESSEL_TORQUE = InputKind(
     "external torque on {owner}, {axis} in its axes",
     _zero,
 )
+FLOW = InputKind(
+    "flow",
+    "flow",
+    "point",
+    0,
+    "kg/s",
+    "action",
+    "",
+    "propellant that leaves {vessel} through {owner}; the mass of {vessel} is to fall by it",
+    lambda scene, owner: (0.0,),
+    0.0,
+    "a flow",
+)
 GRAVITY_POSITION = InputKind(
     "gravity",
     "gravity.position",
@@ -331,6 +344,7 @@ BLOCKS: tuple[tuple[InputKind, ...], ...] = (
     (WHEEL_TORQUE,),
     (FORCE,),
     (VESSEL_TORQUE,),
+    (FLOW,),
     (GRAVITY_POSITION, GRAVITY_VELOCITY),
 )
 """All kinds, in the order of the model description: shape, contact, action, field.

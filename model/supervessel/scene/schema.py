@@ -239,6 +239,7 @@ class Inputs(Table):
     wheel         : wheels with a motor, "vessel.wheel"
     force         : points, "vessel.point"
     vessel_torque : vessels
+    flow          : points through which propellant leaves, "vessel.point", of vessels listed in `mass`
     gravity       : whether the gradient of gravity turns the body, of the centre in `[gravity]`
     range         : lowest and highest value by an input's name, with or without index, in the input's unit
     """
@@ -252,6 +253,7 @@ class Inputs(Table):
     wheel: Names = ()
     force: Names = ()
     vessel_torque: Names = ()
+    flow: Names = ()
     gravity: Flag = False
     range: dict[str, Bounds] = Field(default_factory=dict)
 

@@ -240,15 +240,15 @@ class Plant:
         orbit). Of "exact" rounding alone is counted. It is large, and useless, where the motion itself is
         sensitive: over tens of radians of a tumble. Where p changes between steps, `error_bound_change` comes
         first. Not meant to be differentiated. Derivation, and what it rests on: model/docs/error_bound.md.
-        Raises ValueError for "split", whose steps have no bound, for a scene with wheels, and for the law
-        "none" in a field of gravity.
+        Raises ValueError for "split", whose steps have no bound, for a scene with wheels or flows, and for
+        the law "none" in a field of gravity.
 
         Example:
             >>> bound = twin.error_bound(twin.x_start, [0, 0], [0, 0, 100], twin.p_start, 0.1)
             >>> bool(bound[0] < 1e-12)  # the law "tensor" leaves nothing out: method and rounding alone
             True
         """
-        self.refuse_wheels("error_bound")
+        self.refuse_unbounded("error_bound")
         bound = ca.SX.sym("bound", 2)
         parts = {name: self._c[place] for name, place in self._model.slices.composite.items()}
         end = bound_over_step(self._model, parts, bound, (self.x, self._turning_inputs, self.h))
@@ -261,7 +261,7 @@ class Plant:
 
         x : before the change, see `change`
         A mass that goes up and down makes the bound of the rate larger each time. The true motion keeps
-        what the scene says for the law "tensor". Raises ValueError for a scene with wheels.
+        what the scene says for the law "tensor". Raises ValueError for a scene with wheels or flows.
 
         Example:
             >>> lighter = twin.p_with({"DG.mass": 12000.0})
@@ -269,7 +269,7 @@ class Plant:
             >>> bool(bound[1] <= 1.0)  # the rates stay, and so does their difference; the moments shrink
             True
         """
-        self.refuse_wheels("error_bound_change")
+        self.refuse_unbounded("error_bound_change")
         p_next, bound = ca.SX.sym("p_next", self.p.numel()), ca.SX.sym("bound", 2)
         shaping = len(self._model.names.p)
         following = ca.substitute(self._inputs, self.p, p_next)
@@ -278,14 +278,18 @@ class Plant:
         arguments = {"x": self.x, "bound": bound, "p": self.p, "p_next": p_next}
         return self._function("error_bound_change", arguments, {"bound_next": end})
 
-    def refuse_wheels(self, what: str) -> None:
-        """Raises ValueError where the scene has wheels, which `what` does not know.
+    def refuse_unbounded(self, what: str) -> None:
+        """Raises ValueError where the scene has wheels or flows, which `what` does not know.
 
         Example:
-            >>> twin.refuse_wheels("my bound")
+            >>> twin.refuse_unbounded("my bound")
         """
-        if self.scene.wheels:
-            raise ValueError(f'{what}: scene "{self.scene.name}" has wheels, which the bound does not know')
+        known = {"wheels": self.scene.wheels, "flows of propellant": self.scene.inputs.flow}
+        for kind, names in known.items():
+            if names:
+                raise ValueError(
+                    f'{what}: scene "{self.scene.name}" has {kind}, which the bound does not know'
+                )
 
     def rollout(self, count: int) -> TwinFunction:
         """Returns the function x, u (m, N), p, h -> x_next (n, N) of N steps under one p.

@@ -16,6 +16,7 @@ from supervessel.problems import unknown
 from supervessel.rotation.attitude import to_inertial, unit
 from supervessel.rotation.dynamics import Dynamics, dynamics_of
 from supervessel.rotation.principal import principal
+from supervessel.scene.inputs import FLOW
 from supervessel.twin.conventions import acados_model, do_mpc_model
 from supervessel.twin.error_state import error_rate, retracted, state_error
 from supervessel.twin.functions import TwinFunction
@@ -49,7 +50,7 @@ class Scales:
     """Magnitudes by which the numbers of a problem are divided to be about 1.
 
     x : of attitude, angular velocity [rad/s] and momenta of wheels [N m s]
-    u : (m,), of torques [N m]; the same numbers stand for forces [N]
+    u : (m,), of torques [N m]; the same numbers stand for forces [N]; of flows [kg/s] the mass over the time
     p : (n,), each in the unit of its input
     e : of the error state [rad, rad/s, N m s]
     h : [s]
@@ -67,8 +68,8 @@ class Twin(Plant):
 
     x = (attitude w, x, y, z; angular velocity [rad/s], body axes), (7,), and behind that the momentum of each
         wheel along its axis [N m s]: seven numbers are told below, each wheel adds one
-    u = the inputs that act, torque [N m] first, then motors of wheels [N m], forces [N] and torques on
-        vessels, (m,)
+    u = the inputs that act, torque [N m] first, then motors of wheels [N m], forces [N], torques on vessels
+        and flows of propellant [kg/s], (m,)
     p = the FMU's other inputs, (n,), in the order of its model description
     h = step [s]
     e = (error of attitude [rad], of angular velocity [rad/s]) about a reference, body axes, (6,), and behind
@@ -204,7 +205,7 @@ class Twin(Plant):
 
     @cached_property
     def trim(self) -> TwinFunction:
-        """x, p -> u, (m,), whose torque keeps the angular velocity of x constant; motors and forces are zero.
+        """x, p -> u, (m,), whose torque keeps the angular velocity of x constant; all else in u is zero.
 
         The torque is omega x (J omega + h), (3,) [N m], body axes, h the momentum of moving ports and of
         wheels, less that of gravity's gradient: a relative equilibrium. Without h and gravity it is zero for
@@ -309,7 +310,9 @@ class Twin(Plant):
             raise ValueError(f"scales: time = {time!r} s: must be positive")
         rate = np.full(3, 1.0 / time)
         moment = float(ca.trace(self.composite(self.p_start)[2])) / 3.0
-        torque = np.full(len(self.u_names), moment / time**2)
+        mass = float(self.composite(self.p_start)[0])
+        by_kind = (mass / time if v.kind is FLOW else moment / time**2 for v in self.u_variables)
+        torque = np.fromiter(by_kind, dtype=np.float64)
         groups = [variable.group for variable in self._p_variables]
         p = [
             max(abs(v) for v, g in zip(self.p_start, groups, strict=True) if g == group) or 1.0
@@ -421,7 +424,7 @@ class Twin(Plant):
         )
         inputs = ca.Function("inputs", [self.p], [self._inputs])(at["p"])
         first = len(self._model.names.p) + len(self._model.names.k)  # of the place in a field of gravity
-        x_next = compiled(at["x"], ca.vertcat(at["u"], inputs[first:]), inputs[:first], at["h"])
+        x_next = compiled(at["x"], ca.vertcat(at["u"], inputs[first:, :]), inputs[:first, :], at["h"])
         options: Any = {"custom_jacobian": jacobian, "enable_forward": False, "enable_reverse": False}
         step = ca.Function(compiled.name(), [*at.values()], [x_next], [*at], ["x_next"], options)
         return self._checked(step)

@@ -18,8 +18,8 @@ def fastest_square(
     by_torque        : length a of the acceleration [rad/s2] by the torque alone, constant in body axes
     growth           : bound g of d|omega|/dt over |omega|^2 by the gyroscopic term
     angle            : [rad]
-    spin_square      : square of a bound b, [rad2/s2], of what the spin of moving parts adds to the
-                       acceleration, over |omega|; None: none moves
+    spin_square      : square of a bound b, [rad2/s2], of what the spin of moving parts, and jet damping, add
+                       to the acceleration, over |omega|; None: there are none
 
     With w = |omega|, dw/dt <= g w^2 + a. Over the angle s turned, ds = w dt, this reads
     d(w^2)/ds <= 2 g w^2 + 2 a, so that w^2 <= w_0^2 e + 2 a f at the end of the angle, with e = exp(2 g s),

@@ -1,15 +1,16 @@
 """Exact free motion seen from the body axes, as functions for C and for the twin."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import reduce
 from operator import add
+from typing import Any
 
 import casadi as ca
 
 from supervessel.rotation.attitude import product, unit
 from supervessel.rotation.laws import principal_products
 from supervessel.rotation.propagators import free_motion, theta
-from supervessel.rotation.propagators.method import NOT_FREE, Propagator
+from supervessel.rotation.propagators.method import NOT_FLOWING, NOT_FREE, Propagator
 
 STATE_SIZE = 7
 
@@ -150,6 +151,11 @@ def _in_body(state: ca.SX, R_body_principal: ca.SX, turn: ca.SX, omega_end: ca.S
     return ca.vertcat(unit(product(state[:4], turn_body)), R_body_principal @ omega_end)
 
 
+def _suits(law: str, inputs: Mapping[str, Any]) -> str:
+    """Returns why free motion alone makes no sense: under a torque that follows from the rate."""
+    return NOT_FLOWING if inputs.get("flow") else ""
+
+
 PROPAGATOR = Propagator(
     None,
     "error",
@@ -160,5 +166,6 @@ PROPAGATOR = Propagator(
     c_files=("free_step", "free_motion"),
     marker="P",
     setting="",
+    suits=_suits,
     wheels=NOT_FREE + "the momentum that they hold turns the body otherwise than free motion",
 )

@@ -30,6 +30,7 @@ class StepSymbols:
     with_error   : whether a method that needs no estimate for itself shall give one
     field        : the field of gravity, None where there is none
     wheels       : None where there are none
+    slowing      : of jet damping, see `Dynamics.slowing`; None where there is none
     """
 
     state: ca.SX
@@ -42,6 +43,7 @@ class StepSymbols:
     with_error: bool
     field: "Field | None" = None
     wheels: "SpunWheels | None" = None
+    slowing: ca.SX | None = None
 
     @property
     def acceleration_by_torque(self) -> ca.SX:
@@ -54,7 +56,8 @@ class StepSymbols:
         torque = self.torque
         if self.field is not None:
             torque = torque + self.field.torque(self.state[:4], self.state[-6:-3])
-        return self.law.acceleration(self.numbers, ca.SX.zeros(3), torque)
+        by_torque = self.law.acceleration(self.numbers, ca.SX.zeros(3), torque)
+        return by_torque if self.slowing is None else by_torque - self.slowing @ self.state[4:7]
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,12 @@ Setting = Literal["max_angle_step", "tolerance", ""]
 
 
 STILL_PARTS = 'must be "auto", "rk4", "dop853" or "exact" where inputs.motion lists ports'
+
+NOT_FLOWING = (
+    'must be "auto", "rk4", "dop853" or "taylor" where inputs.flow lists points: the torque of jet damping '
+    "changes with the angular velocity"
+)
+"""Why a method made of free motion does not suit jet damping."""
 
 NOT_FREE = 'must be "auto", "rk4", "dop853" or "taylor" in a scene with wheels: '
 """Beginning of why a method does not suit wheels."""

@@ -12,6 +12,7 @@ import casadi as ca
 from supervessel.rotation.gravity import Field
 from supervessel.rotation.propagators.dop853 import runge_kutta_end
 from supervessel.rotation.propagators.method import (
+    NOT_FLOWING,
     NOT_FREE,
     STILL_PARTS,
     Propagator,
@@ -59,6 +60,8 @@ def _suits(law: str, inputs: Mapping[str, Any]) -> str:
         return 'makes no sense with rotation.law = "none", where torque does nothing; take any other'
     if inputs.get("motion"):
         return STILL_PARTS
+    if inputs.get("flow"):
+        return NOT_FLOWING
     if not acting(inputs):
         return 'must be "exact" or "auto" without inputs.torque'
     return ""

@@ -45,7 +45,8 @@ def taylor_step(motion: StepSymbols, order: int) -> tuple[ca.SX, ca.SX]:
     (k + 1) w_k+1 = step (acceleration by the coefficients k of the products, and where k = 0 by torque),
     (k + 1) p_k+1 = sum over j of p_j (0, step/2 w_k-j).
     In a field of gravity the series of `gradient_series` add to the acceleration. With wheels the torque
-    -w x S does, S = S_0 + s S_1 being their momentum: motors have a constant torque.
+    -w x S does, S = S_0 + s S_1 being their momentum: motors have a constant torque. Jet damping adds a
+    constant matrix times w.
     The terms that hold a coefficient 0, or k, stand by themselves: nothing else waits for the latest ones.
     Source: [JZ].
     """
@@ -65,6 +66,8 @@ def taylor_step(motion: StepSymbols, order: int) -> tuple[ca.SX, ca.SX]:
         turns.append([scale * x for x in _turn(turns, rates, step)] if k else [ca.SX(0), *start])
         if held is not None and law.products:
             change = change + scale * held.next(rates)
+        if motion.slowing is not None:
+            change = change - (scale * step) * (motion.slowing @ ca.vertcat(*rates[-1]))
         if gradient is not None:
             change = change + scale * gradient.next(rates)
         rates.append(ca.vertsplit(ca.densify(change + push if k == 0 else change)))
