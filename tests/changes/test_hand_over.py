@@ -19,7 +19,10 @@ from changes.histories import (
     start_values,
 )
 from changes.scenes import MIR
+from fmu_build.interface.model_description import role_attributes
+from fmu_build.interface.variable_table import variable_table
 from supervessel import Scene, Twin, reference
+from supervessel.equations import equations
 from supervessel.scene.outputs import VESSEL_OUTPUTS
 from support import EPS, ISS_DG, OK, Array, Instance, scene, variant
 from support.marks import FMI
@@ -364,6 +367,20 @@ def test_what_can_make_no_jump_is_zero():
             assert instance.set({"DG.nose.position[1]": 4.0}) == OK
         assert not np.any(read(instance, *names))
         instance.free()
+
+
+def test_jumps_are_discrete_where_nothing_makes_them_between_events():
+    """Masses, which are continuous, may be set in step mode by an importer that uses event mode for docks."""
+    docked, masses = variant(BERTH, {"inputs": {"docked": ["berth"]}}), {"mass": ["DG"]}
+    for raw, variability in (
+        (docked, "discrete"),
+        (BERTH, "continuous"),
+        (handing(ISS_DG, "DG", inputs=masses), "discrete"),
+    ):
+        entries = variable_table(equations(scene(raw)))
+        declared = {entry.name: role_attributes(entry)["variability"] for entry in entries}
+        assert {declared[f"{name}[{i}]"] for name in JUMPS for i in (1, 2, 3)} == {variability}
+        assert declared["DG.velocity[1]"] == "continuous"
 
 
 def test_the_twin_leaves_jumps_out():

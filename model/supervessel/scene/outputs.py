@@ -53,8 +53,8 @@ class OutputKind:
     matrix      : whether it is a (3, 3) matrix, row by row, whose variables carry two indices
     axes        : whether it shows principal moments or axes, which are computed only for such outputs
     of_step     : whether it is a result of a communication step; the twin, which takes none, leaves it out
-    jump        : whether it tells what the last instant of change did; it changes at events only, and the
-                  twin, which knows no last one, leaves it out
+    jump        : whether it tells what the last instant of change did; the twin, which knows no last one,
+                  leaves it out
     nominal     : magnitudes of the assembly -> its magnitude, for an importer's solver
     """
 

@@ -163,6 +163,7 @@ def parameter_variables(scene: Scene) -> tuple[Parameter, ...]:
 
 def output_variables(scene: Scene) -> tuple[OutputVariable, ...]:
     """Returns the outputs that the scene lists, in its order, vectors and tensors element by element."""
+    at_events = _changes_at_events(scene)
     return tuple(
         OutputVariable(
             name,
@@ -170,7 +171,7 @@ def output_variables(scene: Scene) -> tuple[OutputVariable, ...]:
             _described(scene, kind, owner) + (f", {label}" if label else ""),
             group=group,
             element=i,
-            discrete=kind.jump,
+            discrete=kind.jump and at_events,
             kind=kind,
             owner=owner,
         )
@@ -184,6 +185,16 @@ def _described(scene: Scene, kind: OutputKind, owner: str) -> str:
     """Returns the description of an owner's output, without that of its elements."""
     first, second = scene.dock(owner).ports if kind.owner == "dock" else ("", "")
     return kind.description.format(owner=owner, first=first, second=second, first_vessel=vessel_of(first))
+
+
+def _changes_at_events(scene: Scene) -> bool:
+    """Whether what shapes the composite changes at events only, where there are events.
+
+    In co-simulation only scenes with docks have event mode, in FMI 3.0. An importer that uses it may set what
+    is continuous between events too.
+    """
+    shaping = (variable for variable in input_variables(scene) if variable.part == "shape")
+    return not scene.inputs.docked or all(variable.discrete for variable in shaping)
 
 
 def state_variables(scene: Scene) -> tuple[StateVariable, ...]:
