@@ -103,4 +103,5 @@ def test_a_trade_that_freezes_the_mass_leaves_the_flows_out():
     assert {model.law for model in tried} == {"decoupled", "principal", "tensor"}
     frozen = variant_of(scene(raw), Choice(Model("tensor", "mass"), "taylor"))
     assert (frozen.inputs.mass, frozen.inputs.flow, dict(frozen.inputs.range)) == ((), (), {})
-    assert frozen.experiment is not None and not frozen.experiment.inputs
+    assert frozen.experiment is not None
+    assert not frozen.experiment.inputs
