@@ -306,3 +306,15 @@ def test_the_page_tells_what_was_mended(tmp_path: Any) -> None:
 def test_without_mend_rounded_numbers_are_refused(tmp_path: Any) -> None:
     with pytest.raises(SceneError, match="2055 exceeds 850 \\+ 1200 by 5"):
         loaded(tmp_path, SHEET.replace("mend = true", ""))
+
+
+@pytest.mark.parametrize(
+    ("given", "moved"),
+    [
+        ({"pmi": [10, 10.0, 20.6]}, [10.5, 10.05, 20.55]),
+        ({"pmi": [1, 2.0, 3.6]}, [1.5, 2.05, 3.55]),
+    ],
+)
+def test_half_a_unit_of_each_may_be_just_enough(given, moved) -> None:
+    found = np.diag(np.array(scene(alone(mend=True, **given)).vessels["B"].specific_inertia))
+    assert np.abs(found - moved).max() <= 1e-8

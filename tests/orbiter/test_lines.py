@@ -141,6 +141,18 @@ def test_blocks_of_one_name_stand_within_each_other(files):
     assert files.notes() == []
 
 
+def test_a_block_that_ends_behind_the_one_in_which_it_begins_belongs_to_that(files):
+    expected = files.raw()
+    block = "  BEGIN_A\n  BEGIN_B\n  END_A\n  PRPLEVEL 0:0.125\n  AROT 1 2 3\n  END_B\n"
+    text = files.replace(files.scenario, ("  AROT 30.00", block + "  AROT 30.00"))
+    assert files.raw() == expected
+    inner, own = (line_of(text, f"PRPLEVEL 0:{level}") for level in ("0.125", "0.25"))
+    assert files.notes() == [
+        f"side.scn:{inner}: PRPLEVEL 0:0.125: a level in the block BEGIN_A of the code of "
+        f'"Station", not read; the vessel\'s own is in line {own}'
+    ]
+
+
 def test_a_block_ends_with_the_last_line_that_closes_one_where_an_inner_one_does_not(files):
     expected = files.raw()
     block = "  BEGIN_A\n  BEGIN_A\n  AROT 1 2 3\n  END_A\n"

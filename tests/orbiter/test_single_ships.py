@@ -117,6 +117,13 @@ def test_every_section_that_gives_no_number_is_said(files):
     assert "# - code.toml [Atlantis]: not used" in files.made().text
 
 
+def test_a_ships_section_without_any_number_is_said(files):
+    expected = files.raw()
+    files.table.write_text(f'{TABLE}["GL-01"]\nsource = "somewhere"\n')
+    assert files.raw() == expected
+    assert files.notes() == [f"code.toml: [GL-01]: {NOT_USED}"]
+
+
 def test_of_many_sections_that_are_not_used_the_first_are_named(files):
     files.table.write_text(TABLE + "".join(f"[x{i}]\n" for i in range(20_000)))
     notes = files.notes()

@@ -347,7 +347,8 @@ def _from_table(place: Place, table: Any, of_class: VesselClass | None = None) -
         given |= dict(zip(("pmi", "pmi_place", "fallback"), moments, strict=True))
     given |= {"tanks": tanks} if "propellant" in table or of_class is None else {}
     given |= {"ports": tuple(ports)} if "dock" in table or of_class is None else {}
-    given["sections"] = (place.key, *(of_class.sections if of_class else ()))
+    own = (place.key,) if given else ()  # a section that gives nothing is not used
+    given["sections"] = (*own, *(of_class.sections if of_class else ()))
     return replace(of_class, **given) if of_class else VesselClass(**given)
 
 

@@ -87,13 +87,14 @@ def import_scenario(
         _levels(found.ships[name], problems)  # what is wrong with them is told all the same
     members = _members(found, mated, classes, problems, notes)
     key = _convention(members, convention, problems, notes)
-    notes += [*_doubts(found, members), *_unused(library, members)]
+    notes += _doubts(found, members)
     saved = {name: saved_motion(found.ships[name], problems) for name in names}
     if problems:
         raise ScenarioError(dict.fromkeys(problems))
     draft = Assembled(found, root, members, mated, key, [])
     start, more = start_of(_checked(draft, Start()), draft, saved)
-    final = Assembled(found, root, members, mated, key, notes + more)
+    notes += [*more, *_unused(library, members)]  # those that say least come last
+    final = Assembled(found, root, members, mated, key, notes)
     _checked(final, start)
     sources = dict.fromkeys([found.path, *(member.of.mass_place.path for member in members.values())])
     return Imported(scene_text(final, start), tuple(map(str, final.notes)), tuple(sources))
@@ -274,10 +275,13 @@ def _masses(
         for tank in sorted(set(range(count)) - set(levels.given)):
             text = f"{quantity(ship.name)} has no level of tank {tank}: taken as empty"
             notes.append(Note(entry.place, text))
+    elif entry is not None and not count:
+        whose = f"class {quantity(ship.class_name)} of {quantity(ship.name)} has no tanks"
+        notes.append(Note(entry.place, f"FUEL: {whose}; not used"))
     loaded = sum(tank * levels.given.get(i, levels.others) for i, tank in enumerate(made.tanks))
     full = sum(made.tanks)
     said = f"{entry.place.short}: {entry}" if entry else "neither PRPLEVEL nor FUEL: full"
-    of = f"propellant {loaded} of {full} kg ({said})" if made.tanks else "no propellant"
+    of = f"propellant {loaded:.10g} of {full:.10g} kg ({said})" if made.tanks else "no propellant"
     return made.empty_mass + loaded, made.empty_mass + full, of
 
 

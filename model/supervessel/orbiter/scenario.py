@@ -5,7 +5,7 @@ know itself. Blocks of lines in them, a line that opens and a line that closes, 
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -159,11 +159,8 @@ def _blocks(entries: Sequence[Entry]) -> tuple[list[Entry], list[tuple[Entry, En
     place = 0
     while place < len(entries):
         entry = entries[place]
-        closing = _closing(entry.key)
-        named = "" if entry.key in KEYS else f"END {entry.key.rstrip(':')}"
-        found = next((line for line in (closing, named) if line and last.get(line, -1) > place), "")
-        if found:
-            end = _end(entries, place, found)
+        closing, end = _closing(entry.key), _end_of_block(entries, place, last)
+        if end > place:
             code += [(entry, inner) for inner in entries[place + 1 : end]]
             place = end + 1
             continue
@@ -174,6 +171,28 @@ def _blocks(entries: Sequence[Entry]) -> tuple[list[Entry], list[tuple[Entry, En
         own.append(entry)
         place += 1
     return own, code, unclosed
+
+
+def _end_of_block(entries: Sequence[Entry], begin: int, last: Mapping[str, int]) -> int:
+    """Returns the place of the line that closes the block which a line opens; `begin` where it opens none.
+
+    last : where each line that closes a block stands last
+    A block that begins within it and ends behind its end belongs to it.
+    """
+    end = _own_end(entries, begin, last)
+    place = begin + 1
+    while place < end:
+        end = max(end, _own_end(entries, place, last))
+        place += 1
+    return end
+
+
+def _own_end(entries: Sequence[Entry], begin: int, last: Mapping[str, int]) -> int:
+    """Returns the same, whatever begins in the block."""
+    key = entries[begin].key
+    lines = (_closing(key), "" if key in KEYS else f"END {key.rstrip(':')}")
+    found = next((line for line in lines if line and last.get(line, -1) > begin), "")
+    return _end(entries, begin, found) if found else begin
 
 
 def _closed_by(entry: Entry) -> str:

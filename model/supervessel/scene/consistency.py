@@ -66,11 +66,13 @@ def _rigid_moments(place: str, vessel: Mapping[str, Any]) -> Iterator[str]:
     problem = sheet_problem(sheet) if sheet is not None else ""
     if sheet is None or not problem:
         return
-    if vessel.get("mend") is True:
-        found = mend(sheet)
-        if found.sheet is not None:
-            return
+    found, asked = mend(sheet), vessel.get("mend") is True
+    if asked and found.sheet is not None:
+        return
+    if asked:
         problem += f"; mend = true moves each number by half a unit of its last digit, and {found.reason}"
+    elif found.sheet is not None:
+        problem += "; mend = true would move numbers by no more than the rounding of their last digit"
     yield f"{place}{sheet_text(vessel, sheet)}: {problem}"
 
 

@@ -35,6 +35,8 @@ TOLD = 1e-14
 """Least weight over the largest number in units of the last digit: S is right to some 1e-16 of that."""
 CENTRED = 0.1
 """Newton's decrement from which a minimum counts as found."""
+DIGITS = 8
+"""Decimals of moves that need half a unit of the last digit, no less: they are found to more."""
 MOST_STEPS = 100
 """Most steps of Newton's method for one weight."""
 
@@ -104,12 +106,15 @@ def mend(sheet: Sheet) -> Mended:
     halves = sheet.halves[free] / unit
     moved_by = np.array([half * _second_moments(np.eye(6)[i]) for i, half in zip(free, halves, strict=True)])
     share, weights = _least_share(given, moved_by), WEIGHTS[TOLD * size / unit <= WEIGHTS]
-    if share < 1.0:
+    moves = np.full(len(free), 2.0)
+    if share <= 1.0 + 0.1**DIGITS:
         moves, share = _inside(given, moved_by, halves, weights)
-    if share >= 1.0:
+    just_enough = np.round(moves, DIGITS)  # half a unit of each that moves
+    moves = _nearest(given, moved_by, moves, weights) if share < 1.0 else just_enough
+    if np.any(np.abs(moves) > 1.0):
         return Mended(None, f"{share:.3g} of that would be needed at least")
     elements = sheet.elements.copy()
-    elements[free] += unit * halves * _nearest(given, moved_by, moves, weights)
+    elements[free] += unit * halves * moves
     moved = replace(sheet, elements=elements)
     return Mended(None, TOO_FINE) if sheet_problem(moved) else Mended(moved)
 
