@@ -234,16 +234,19 @@ def _leave_out_gravity(raw: dict[str, Any]) -> None:
 
 
 def _freeze(raw: dict[str, Any], change: str, start: Mapping[str, float]) -> None:
-    """Makes constants of the inputs of a kind of change, with the experiment's values at its start."""
+    """Makes constants of the inputs of a kind of change, with the experiment's values at its start.
+
+    A mass that is constant has no flow: flows are taken out with masses.
+    """
     inputs, vessels = raw["inputs"], raw["vessels"]
     frozen = {
         name: (kind, owner, element)
         for kind, owner in listed(inputs)
-        if kind.change == change or (kind is FLOW and change == MASS.change)  # a mass that stays has no flow
+        if kind.change == change or (kind is FLOW and change == MASS.change)
         for element, name in enumerate(kind.names(owner))
     }
     for name, value in start.items():
-        if name in frozen:
+        if name in frozen and frozen[name][0] is not FLOW:
             kind, owner, element = frozen[name]
             vessel = vessels[vessel_of(owner)]
             table = vessel["ports"][part_of(owner)[1]] if kind.owner == "port" else vessel
