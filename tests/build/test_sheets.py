@@ -81,7 +81,7 @@ BAD = [
         "a diagonal that no body has",
         {"vessels.B.inertia": [1, 1, 3]},
         f"vessels.B.inertia = [1, 1, 3] kg m2: its principal moments are 1, 1, 3 kg m2: 3 exceeds 1 + 1 "
-        f"by 1; {NO_BODY}",
+        f"by 1; {NO_BODY}; mend = true would move numbers by no more than the rounding of their last digit",
         base=alone(),
     ),
     case(

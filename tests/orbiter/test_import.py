@@ -112,7 +112,7 @@ def test_comments_say_where_each_number_is_from(files):
 
     assert above("[vessels.GL_01]") == '# "GL-01", side.scn line 21: class "Glider"'
     assert above("mass = 20125.0  # kg") == (
-        "# Hub.cfg line 2: empty 20000.0 kg; propellant 125.0 of 500.0 kg (side.scn line 18: PRPLEVEL 0:0.25)"
+        "# Hub.cfg line 2: empty 20000.0 kg; propellant 125 of 500 kg (side.scn line 18: PRPLEVEL 0:0.25)"
     )
     assert above("pmi = [40.0, 30.0, 20.0]  # m2") == "# Hub.cfg line 4"
     assert above("[vessels.Station.ports.dock1]") == "# Hub.cfg line 8"
