@@ -412,3 +412,39 @@ def test_no_body_between_two_changes_of_one_instant_is_refused_where_poses_move(
         instance.get(JUMPS[0])
     assert "nothing is left that has a mass" in instance.messages()[-1]
     instance.free()
+
+
+@pytest.mark.parametrize("distance", [0.0, 2.0**20, 2.0**30, 2.0**40])
+def test_a_jump_loses_no_digits_where_axes_begin_far_away(distance):
+    # Two vessels 36 m apart, their axes far from them; what undocks takes its share of the distance along.
+    masses = (4e5, 2e4)
+    port = {"direction": [1, 0, 0], "alignment": [0, 1, 0]}
+    ports = (
+        {"p": port | {"position": [distance + 20.0, 0, 0]}},
+        {"p": port | {"position": [distance + 16.0, 0, 0]}},
+    )
+    vessels = {
+        name: {"mass": mass, "pmi": [1.0, 2.0, 2.0], "centre_of_mass": [distance, 0, 0], "ports": own}
+        for name, mass, own in zip("ST", masses, ports, strict=True)
+    }
+    raw = {
+        "name": "far",
+        "root": "S",
+        "vessels": vessels,
+        "docks": [{"name": "d", "ports": ["S.p", "T.p"]}],
+        "inputs": {"docked": ["d"]},
+        "rotation": {"angular_velocity": [0.0, 0.0, 0.02]},
+        "outputs": {
+            "names": ["barycentre_jump", "barycentre_velocity_jump", "T.centre_of_mass", "T.velocity"]
+        },
+    }
+    instance = Instance(raw)
+    assert instance.initialise() == OK
+    assert instance.set({"d.docked": False}) == OK
+    jump, velocity, place, moves = (instance.get(name) for name in raw["outputs"]["names"])
+    instance.free()
+    share = 36.0 * masses[1] / sum(masses)
+    assert np.abs(jump - [-share, 0, 0]).max() <= 16 * EPS * 36.0
+    assert np.abs(velocity - [0, -0.02 * share, 0]).max() <= 16 * EPS * 0.72
+    assert np.abs(masses[0] * velocity + masses[1] * (velocity + moves)).max() <= 64 * EPS * masses[1] * 0.72
+    assert np.abs(masses[0] * jump + masses[1] * (jump + place)).max() <= 64 * EPS * masses[1] * 36.0

@@ -26,7 +26,7 @@ def largest(found: dict[str, Array], kind: str) -> float:
 @pytest.mark.parametrize("wheels", [False, True], ids=["plain", "wheels"])
 @pytest.mark.parametrize("law", ["decoupled", "principal", "tensor"])
 def test_loads_and_points_of_random_trees_are_the_references(law, wheels, gravity):
-    for seed in range(4):
+    for seed in range(2):
         flown = scene(tree(seed, 2 + 5 * (seed % 2), wheels=wheels, gravity=gravity, held=3, law=law))
         x, values = drawn(flown, seed)
         found = shown(flown, x, values)
@@ -66,7 +66,7 @@ def test_what_is_mounted_beyond_a_dock_hangs_on_it():
 
 @pytest.mark.parametrize("gravity", [False, True], ids=["free", "gravity"])
 @pytest.mark.parametrize("wheels", [False, True], ids=["plain", "wheels"])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_load_is_the_same_whatever_vessel_is_the_root_and_whichever_port_stands_first(
     seed, wheels, gravity
 ):
@@ -185,3 +185,18 @@ def test_the_specific_force_is_the_second_difference_of_a_flown_points_place():
     assert np.abs(turn @ row["V1.rcs.acceleration"] - second).max() <= allowed
     felt = row["V1.rcs.acceleration"] + row["net_force"] / row["mass"]
     assert np.abs(row["V1.rcs.specific_force"] - felt).max() <= 4 * U * np.abs(felt).max()
+
+
+@pytest.mark.parametrize("mass", [1.0, 1e-6, 1e-12, 0.0])
+@pytest.mark.parametrize("root", ["A", "B"])
+def test_a_light_vessel_at_a_heavy_one_loses_no_digits_whichever_is_the_root(root, mass):
+    # The load is what moves the light one: m s, at its centre of mass, of the motion that the heavy one has.
+    raw = dumbbell((4e5, mass), (20.0, 2.0))
+    raw = variant(raw, {"root": root, "inputs": {"torque": True}})
+    flown, x = scene(raw), np.array([1.0, 0, 0, 0, 0.01, 0.02, 0.03])
+    values = {} if root == "B" else {"torque[1]": 1000.0}
+    found = shown(flown, x, values)
+    motion = reference.ode(flown, x, values=values)[4:7]
+    place = np.array([22.0 * 4e5 / (4e5 + mass), 0.0, 0.0])
+    felt = np.cross(motion, place) + np.cross(x[4:7], np.cross(x[4:7], place))
+    assert np.abs(found["bar.force"] - mass * felt).max() <= 16 * U * mass * np.abs(felt).max()

@@ -163,6 +163,15 @@ def torque_about_barycentre(resolved: ResolvedScene, parts: Mapping[str, ca.SX],
     return total
 
 
+def torque_on_root(resolved: ResolvedScene, u: ca.SX) -> ca.SX:
+    """Returns the torque about the barycentre that is an input itself, (3,) [N m], body axes.
+
+    u : the inputs that act. It counts as a torque on the root vessel.
+    """
+    places = [place for place, variable in _acting(resolved) if equation_of(variable.kind) is None]
+    return sum((u[place : place + 3] for place in places), ca.SX.zeros(3))
+
+
 def net_force(resolved: ResolvedScene, parts: Mapping[str, ca.SX], u: ca.SX) -> ca.SX:
     """Returns the sum of all forces, (3,) [N], body axes; parts, u : as in `torque_about_barycentre`."""
     total = ca.SX.zeros(3)

@@ -13,7 +13,7 @@ from supervessel.composite.bodies import composite_body, energy_of_motion, looku
 from supervessel.composite.docks import alone_as_given
 from supervessel.composite.inertia import Body, ldl, ldl_inverse, upper_triangle
 from supervessel.composite.poses import anchor, constant
-from supervessel.composite.resolved import ResolvedScene
+from supervessel.composite.resolved import ResolvedScene, resolve
 from supervessel.composite.shown.loads import load_parts
 from supervessel.composite.shown.points import point_parts
 from supervessel.composite.wheels import (
@@ -87,6 +87,8 @@ def composite_parts(resolved: ResolvedScene, p: ca.SX) -> dict[str, ca.SX]:
 
     The parts of COMPOSITE_SIZES come first. Then, each where the scene has it:
 
+    centre        : (3,) [m], where a change hands something over: the barycentre from the root's anchor, root
+                    axes, of which differences lose no digits where these axes begin far away
     law           : the numbers that the rotation law needs, of J - A, see `rotation.laws`
     momentum      : (4,), where ports move: angular momentum h, (3,) [N m s], body axes, of the parts that
                     move relative to body axes; and the square, [rad2/s2], of |h| trace((J - A)^-1), which
@@ -136,6 +138,8 @@ def body_parts(scene: Scene, body: Body, wheels: WheelAxes | None = None) -> dic
         "margins": _margins(turning, pivots, may_be_point),
         "law": LAWS[law].prepare(turning),
     }
+    if resolve(scene).hands_over:
+        parts["centre"] = body.centre
     if body.spin is not None or wheels is not None:
         bound = ca.SX(0.0) if may_be_point else ca.trace(ldl_inverse(lower, pivots))
     if wheels is not None:

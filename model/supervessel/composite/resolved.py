@@ -52,6 +52,23 @@ class RigidGroup:
 
 
 @dataclass(frozen=True, eq=False)
+class Side:
+    """The vessels on one side of a dock.
+
+    is_near : whether it is the root's side, else the one beyond the dock
+    pieces  : by way to a group, its vessels on that side while the way holds the group
+    """
+
+    is_near: bool
+    pieces: tuple[tuple[Way, frozenset[str]], ...]
+
+    @property
+    def vessels(self) -> frozenset[str]:
+        """All that may be on that side."""
+        return frozenset[str]().union(*(vessels for _, vessels in self.pieces))
+
+
+@dataclass(frozen=True, eq=False)
 class ResolvedScene:
     """A scene with all that follows from it before any equation; made by `resolve`.
 
@@ -203,9 +220,31 @@ class ResolvedScene:
             name: tuple(crossings(self.scene, self.scene.dock(name), hanging)) for name in self.docks_shown
         }
 
-    def beyond(self, dock: str) -> frozenset[str]:
-        """Returns the vessels that are beyond a dock, seen from the root, by some way over it."""
-        return frozenset[str]().union(*(crossing.vessels for crossing in self.crossings[dock]))
+    @cached_property
+    def lighter(self) -> Mapping[str, "Side"]:
+        """By dock that outputs are about, the side whose vessels its load is computed from.
+
+        It is the lighter one, by the masses at the start. Where the sum over all vessels does not close,
+        under another law than "tensor" or Orbiter's convention, it is that beyond the dock, seen from the
+        root.
+        """
+        return {name: self._lighter_side(name) for name in self.docks_shown}
+
+    def _lighter_side(self, dock: str) -> "Side":
+        far = tuple((crossing.way, crossing.vessels) for crossing in self.crossings[dock])
+        by_way = dict(far)
+        near = tuple(
+            (way, rest)
+            for group in self.groups
+            for way in group.ways
+            if (rest := frozenset(group.inside) - by_way.get(way, frozenset()))
+        )
+        beyond = Side(False, far).vessels
+        masses = {name: vessel.mass for name, vessel in self.scene.vessels.items()}
+        heavy = sum(masses[name] for name in beyond)
+        closes = self.scene.rotation.law == "tensor" and self.scene.convention == "rigid_body"
+        is_near = closes and sum(masses.values()) - heavy < heavy
+        return Side(True, near) if is_near else Side(False, far)
 
     def part_of_group(self, number: int, vessels: Set[str]) -> RigidGroup:
         """Returns some vessels of a group as a group with its axes and ways."""

@@ -22,7 +22,7 @@ OPENING = (
     (re.compile(r"BEGIN_(.+)"), r"END_\1"),
     (re.compile(r"(.+)_BEGIN"), r"\1_END"),
     (re.compile(r"@(?!END)(.+)"), r"@END\1"),
-    (re.compile(r"<(?!/)(.+)>"), r"</\1>"),
+    (re.compile(r"<(?!/)([^>]+)>?"), r"</\1>"),
 )
 """Keys in capitals that open a block, and the key that closes it. So do KEY or KEY: and a line END KEY."""
 

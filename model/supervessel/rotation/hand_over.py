@@ -105,7 +105,7 @@ def _jumps(
     omega_at_contact : as docks close
     velocity         : of the barycentre relative to the root vessel, by the motion at contact, (3,) [m/s]
     """
-    c = {name: of["barycentre"] for name, of in parts.items()}
+    c = {name: of["centre"] for name, of in parts.items()}
     v = {name: of.get("velocity", ca.SX.zeros(3)) for name, of in parts.items()}
     left, joined = c["freed"] - c["before"], c["after"] - c["closing"]
     turned = ca.cross(omega, left) + ca.cross(omega_at_contact, joined)

@@ -1,17 +1,18 @@
 """What docks carry, in CasADi symbols: the load that a named dock's second port receives from its first.
 
-For a tree of docks the load follows from the motion of the vessels beyond the dock, seen from the root, and
-from the forces and torques on them. All is reckoned about the port, so that no arm is longer than what hangs
-on the dock. Root axes have the directions of body axes.
+For a tree of docks the load follows from the motion of the vessels on one side of the dock, and from the
+forces and torques on them. The side is the lighter one, so that no large terms cancel in a small load. All is
+reckoned about the port, so that no arm is longer than what hangs on the dock. Root axes have the directions
+of body axes.
 Source: [EQ] What docks carry, and points, eqs. (21) and (22).
 """
 
-from collections.abc import Set
+from collections.abc import Iterable, Set
 from dataclasses import dataclass
 
 import casadi as ca
 
-from supervessel.composite.actions import acting_about, acting_on
+from supervessel.composite.actions import acting_about, acting_on, torque_on_root
 from supervessel.composite.bodies import (
     Lookup,
     Placed,
@@ -21,6 +22,7 @@ from supervessel.composite.bodies import (
     port_place,
     way_holds,
 )
+from supervessel.composite.docks import Way
 from supervessel.composite.inertia import Body, from_upper_triangle, offset_tensor, upper_triangle
 from supervessel.composite.resolved import ResolvedScene
 from supervessel.composite.shown.points import InstantMotion
@@ -29,17 +31,17 @@ from supervessel.layout import slices_of
 from supervessel.scene.inputs import vessel_of
 
 SIZES = {"side": 1, "mass": 1, "lever": 3, "inertia": 6, "port": 3, "axes": 9}
-"""Sizes of the first elements of a dock's part of c; all but `port` and `axes` are zero while it is open.
+"""Sizes of the first elements of a dock's part of c. Of the vessels on one side, see `ResolvedScene.lighter`:
 
-side    : 1 if the vessels beyond the dock, seen from the root, hang on its second port, -1 if on its first
-mass    : of the vessels beyond [kg]
+side    : 1 if they have the dock's second port, -1 if its first; 0 while the dock is open or off the root
+mass    : theirs [kg]
 lever   : sum of m_j d_j over them [kg m], d_j the centre of mass of vessel j from the port, body axes
 inertia : their tensor about the port [kg m2], body axes, xx, yy, zz, xy, xz, yz
 port    : the port from the barycentre [m], body axes
 axes    : R_body_vessel of the first port's vessel, column by column
 
-Behind them, all zero while their vessel is not beyond: of each force or torque on a vessel the matrices of
-`Acting` about the port, column by column; of each wheel its axis b_w, (3,).
+Behind them, all zero while their vessel is not on that side: of each force or torque on a vessel the matrices
+of `Acting` about the port, column by column; of each wheel its axis b_w, (3,).
 """
 
 
@@ -55,14 +57,14 @@ def load_parts(
         return {}
     where = placed_vessels(resolved, lookup, set(resolved.scene.vessels))
     return {
-        f".{name}": _Beyond(resolved, lookup, where, name).part(centre, wheels)
+        f".{name}": _Weighed(resolved, lookup, where, name).part(centre, wheels)
         for name in resolved.docks_shown
     }
 
 
 @dataclass(frozen=True)
-class _Beyond:
-    """The vessels beyond a dock, seen from the root.
+class _Weighed:
+    """The vessels on the lighter side of a dock.
 
     where : the poses of all vessels
     name  : of the dock
@@ -75,33 +77,41 @@ class _Beyond:
 
     def part(self, centre: ca.SX, wheels: WheelAxes | None) -> ca.SX:
         """Returns the part of c of the dock, in the layout of SIZES; centre, wheels : as of `load_parts`."""
-        scene, vessels = self.resolved.scene, self.resolved.beyond(self.name)
+        scene, side = self.resolved.scene, self.resolved.lighter[self.name]
         first, second = scene.dock(self.name).ports
         port = port_place(scene, first, self.where, self.lookup)
-        side = self.share(vessel_of(second), True) - self.share(vessel_of(first), False)
+        beyond = self._crossed(vessel_of(second), True) - self._crossed(vessel_of(first), False)
         axes = ca.vec(self.where[vessel_of(first)][0].rotation)
         acting = (
-            self.share(vessel) * ca.vec(matrix)
-            for vessel, one in acting_about(self.resolved, self.where, port, vessels)
+            self._share(vessel) * ca.vec(matrix)
+            for vessel, one in acting_about(self.resolved, self.where, port, side.vessels)
             for matrix in one.matrices
         )
         spun = (
-            self.share(vessel_of(scene.wheels[w])) * wheels.axes[:, w]
-            for w in _wheels_on(self.resolved, vessels)
+            self._share(vessel_of(scene.wheels[w])) * wheels.axes[:, w]
+            for w in _wheels_on(self.resolved, side.vessels)
             if wheels is not None
         )
-        return ca.vertcat(side, *self._shape(port), port - centre, axes, *acting, *spun)
+        sign = -beyond if side.is_near else beyond
+        return ca.vertcat(sign, *self._shape(port), port - centre, axes, *acting, *spun)
 
-    def share(self, vessel: str, forwards: bool | None = None) -> ca.SX:
-        """Returns 1 while a vessel is beyond the dock, else 0.
-
-        forwards : the direction of the ways that count, see `Crossing`; None: both
-        """
-        flags = (
-            way_holds(crossing.way, self.resolved, self.lookup)
+    def _crossed(self, vessel: str, forwards: bool) -> ca.SX:
+        """Returns 1 while a way leads over the dock, in that direction, to a vessel, else 0."""
+        ways = (
+            crossing.way
             for crossing in self.resolved.crossings[self.name]
-            if vessel in crossing.vessels and forwards in (None, crossing.forwards)
+            if vessel in crossing.vessels and crossing.forwards is forwards
         )
+        return self._held(ways)
+
+    def _share(self, vessel: str) -> ca.SX:
+        """Returns 1 while a vessel is on the side, else 0."""
+        pieces = self.resolved.lighter[self.name].pieces
+        return self._held(way for way, vessels in pieces if vessel in vessels)
+
+    def _held(self, ways: Iterable[Way]) -> ca.SX:
+        """Returns 1 while one of these ways holds its group, else 0."""
+        flags = (way_holds(way, self.resolved, self.lookup) for way in ways)
         return sum((ca.SX(1.0) if flag is None else flag for flag in flags), ca.SX(0.0))
 
     def _shape(self, port: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
@@ -115,13 +125,12 @@ class _Beyond:
         return mass, lever, upper_triangle(inertia)
 
     def _bodies(self) -> list[Body]:
-        """Returns the vessels as bodies in root axes, without mass while they are not beyond."""
+        """Returns the vessels as bodies in root axes, without mass while they are not on that side."""
         placed, found = placed_groups(self.resolved, self.lookup), []
-        for crossing in self.resolved.crossings[self.name]:
-            number = crossing.way.group
-            group = self.resolved.part_of_group(number, crossing.vessels)
-            bodies = group_bodies(self.resolved, number, group, placed[number], self.lookup)
-            flag = way_holds(crossing.way, self.resolved, self.lookup)
+        for way, vessels in self.resolved.lighter[self.name].pieces:
+            group = self.resolved.part_of_group(way.group, vessels)
+            bodies = group_bodies(self.resolved, way.group, group, placed[way.group], self.lookup)
+            flag = way_holds(way, self.resolved, self.lookup)
             found += bodies if flag is None else [body.times(flag) for body in bodies]
         return found
 
@@ -149,7 +158,9 @@ def load_outputs(
     moment = ca.cross(lever, felt)
     if motion.tide is not None:
         moment -= motion.tide.moment(J)
-    rest, vessels = part[sum(SIZES.values()) :], resolved.beyond(name)
+    rest, vessels = part[sum(SIZES.values()) :], resolved.lighter[name].vessels
+    if resolved.lighter[name].is_near:
+        moment -= torque_on_root(resolved, u)
     for place, is_force in acting_on(resolved, vessels):
         own = u[place : place + 3]
         moment -= ca.reshape(rest[:9], 3, 3) @ own
