@@ -11,6 +11,9 @@ from fmu_build.interface.xml_text import xml_text
 from fmu_build.versions import VERSIONS, Version
 from supervessel.scene.schema import SAID, Scene
 
+TOOL = "supervessel"
+"""What generationTool begins with; the version follows."""
+
 LOG_ACCURACY = "logAccuracy"
 
 LOG_CATEGORIES = {
@@ -80,7 +83,7 @@ def _header(scene: Scene, fmi: Version, token: str, naming: Naming) -> ET.Elemen
         fmi.token: token,
         "description": scene.description or _description(scene),
         **{key: said for key in SAID if key != "description" and (said := getattr(scene, key)) is not None},
-        "generationTool": f"supervessel {version('supervessel')}",
+        "generationTool": f"{TOOL} {version('supervessel')}",
         "variableNamingConvention": naming,
     }
     return ET.Element("fmiModelDescription", attributes)

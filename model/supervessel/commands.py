@@ -1,12 +1,8 @@
-"""The subcommands of supervessel.
-
-supervessel import FILE.scn [...] -o SCENE.toml [--force]
-supervessel trade SCENE.toml [-o FOLDER] [--quick] [--duration S]
-supervessel cache [--clear]
-"""
+"""The subcommands of supervessel: a row of COMMANDS each."""
 
 import argparse
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import get_args
@@ -19,23 +15,47 @@ from supervessel.shell.console import Parser, print_problem, print_results
 from supervessel.shell.files import OutputError, check_output, write_file
 
 
+@dataclass(frozen=True)
+class Command:
+    """A subcommand.
+
+    line    : what it does
+    example : of its use, without the program's name; examples that are in the repository exist
+    add     : adds its arguments, and has the parser's options run it
+    """
+
+    line: str
+    example: str
+    add: Callable[[argparse.ArgumentParser], None]
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs a subcommand; returns 0 when done, 1 when it failed, each problem on stderr."""
-    parser = Parser(prog="supervessel", description="Rotation of docked spacecraft.")
-    parser.add_argument("--version", action="version", version=version("supervessel"))
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    _add_import(commands.add_parser("import", help="make a scene file from Orbiter's files"))
-    _add_trade(commands.add_parser("trade", help="measure what accuracy costs in a scene"))
-    _add_cache(commands.add_parser("cache", help="show what is kept from run to run, or clear it"))
-    options = parser.parse_args(arguments)
+    options = parser().parse_args(arguments)
     return int(options.run(options))
 
 
-def _add_import(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Make a scene file of vessels that are docked in a scenario of Orbiter: one line on stdout, its "
-        "path; what was missing, guessed or left out on stderr."
+def parser() -> Parser:
+    """Returns the parser of all subcommands; the options that it returns have what to run as `run`."""
+    whole = Parser(
+        prog="supervessel",
+        description="Rotation of docked spacecraft: FMUs from scene files.",
+        epilog="supervessel COMMAND --help tells more of each; python -m fmu_build is build.",
     )
+    whole.add_argument("--version", action="version", version=version("supervessel"))
+    commands = whole.add_subparsers(required=True, metavar="COMMAND")
+    for name, command in COMMANDS.items():
+        own = commands.add_parser(
+            name,
+            help=command.line,
+            description=f"{command.line[0].upper()}{command.line[1:]}.",
+            epilog=f"example: supervessel {name} {command.example}",
+        )
+        command.add(own)
+    return whole
+
+
+def _add_import(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scenario", type=Path, metavar="FILE.scn", help="the scenario")
     parser.add_argument(
         "--vessel", default="", metavar="NAME", help="a vessel, which becomes the root (default: the focus)"
@@ -93,14 +113,13 @@ def _check_scene_output(output: Path, inputs: Iterable[Path], force: bool) -> No
 
 
 def _add_trade(parser: argparse.ArgumentParser) -> None:
-    parser.description = (
-        "Build the FMUs of a scene under every sensible law, propagator and step, fly its [experiment] with "
-        "each, compare with references, time: tables on stdout; these, a work-precision plot and all figures "
-        "in a folder. What has been flown is kept in the user's cache: the same again takes seconds."
-    )
     parser.add_argument("scene", type=Path, metavar="SCENE.toml", help="the scene file")
     parser.add_argument(
-        "-o", "--output", type=Path, metavar="FOLDER", help="where files go (default: NAME_trade here)"
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FOLDER",
+        help="for tables, plot and all figures (default: NAME_trade here)",
     )
     parser.add_argument("--quick", action="store_true", help="fewer laws, steps and tolerances")
     parser.add_argument(
@@ -110,6 +129,31 @@ def _add_trade(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_cache(parser: argparse.ArgumentParser) -> None:
-    parser.description = "Show where compiled code and results are kept, how much, and whether that is used."
     parser.add_argument("--clear", action="store_true", help="remove it, nothing but supervessel-N")
     parser.set_defaults(run=fmu.cache)
+
+
+def _add_info(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("fmu", type=Path, metavar="X.fmu", help="an FMU that supervessel has built")
+    parser.add_argument(
+        "--scene", action="store_true", help="print the scene file that it was built from, nothing else"
+    )
+    parser.set_defaults(run=fmu.info)
+
+
+COMMANDS = {
+    "build": Command("build the FMU of a scene; its path on stdout", "examples/iss_dg.toml", fmu.add_build),
+    "info": Command("tell what an FMU is, and what scene it was built from", "iss_dg.fmu", _add_info),
+    "trade": Command(
+        "measure what accuracy costs in a scene; tables on stdout",
+        "examples/iss_dg.toml --quick",
+        _add_trade,
+    ),
+    "import": Command(
+        "make a scene file from Orbiter's files; notes on stderr",
+        "examples/docked.scn --config examples -o my.toml",
+        _add_import,
+    ),
+    "cache": Command("show what is kept from run to run, or clear it", "--clear", _add_cache),
+}
+"""By name, in the order of their listing."""

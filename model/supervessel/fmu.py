@@ -1,6 +1,6 @@
 """The one door from this package to `fmu_build`, which is built on it and looked up when it is needed."""
 
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -50,6 +50,20 @@ def communication_step(scene: Scene, folder: Path) -> ca.Function:
     from fmu_build.compile import native  # noqa: PLC0415
 
     return native.communication_step(scene, folder)
+
+
+def add_build(parser: ArgumentParser) -> None:
+    """Adds what `supervessel build` takes, and has the parser's options run it."""
+    from fmu_build import command  # noqa: PLC0415
+
+    command.add_build(parser, named_after_file=True)
+
+
+def info(options: Namespace) -> int:
+    """Runs `supervessel info`; returns its exit status."""
+    from fmu_build import contents  # noqa: PLC0415
+
+    return contents.info(options)
 
 
 def trade(options: Namespace) -> int:

@@ -19,7 +19,7 @@ from supervessel.scene.names import misnamed_courses, naming_problems, size_prob
 from supervessel.scene.numbers import LARGEST_PLACE, WrittenNumber
 from supervessel.scene.schema import Scene, known_keys
 from supervessel.scene.variables import InputVariable
-from supervessel.shell.reading import ReadingError, read_toml
+from supervessel.shell.reading import ReadingError, read_toml, tables_of
 
 EXPECTED = {
     "dict_type": "a table",
@@ -45,9 +45,27 @@ def load_scene(path: str | Path) -> Scene:
     try:
         raw = read_toml(path, WrittenNumber)
     except ReadingError as error:
-        place = f"line {error.line}: " if error.line else ""
-        raise SceneError(str(path), [f"{place}{error}"]) from None
+        raise _unread(str(path), error) from None
     return parse_scene(raw, path.name)
+
+
+def scene_from_text(text: str, source: str) -> Scene:
+    """Returns the scene that a TOML text describes, as `load_scene` does of a file.
+
+    source : stands before each problem
+    Raises SceneError with every problem found.
+    """
+    try:
+        raw = tables_of(text, WrittenNumber)
+    except ReadingError as error:
+        raise _unread(source, error) from None
+    return parse_scene(raw, source)
+
+
+def _unread(source: str, error: ReadingError) -> SceneError:
+    """Returns what a text that cannot be read means for the user."""
+    place = f"line {error.line}: " if error.line else ""
+    return SceneError(source, [f"{place}{error}"])
 
 
 @few_suggestions()

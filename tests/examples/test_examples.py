@@ -111,10 +111,15 @@ def started(tmp_path_factory) -> Path:
     (folder / "examples").symlink_to(ROOT / "examples", target_is_directory=True)
     (scene,) = blocks("README.md", "toml")
     (folder / "scene.toml").write_text(scene)
-    (command,) = (line for block in blocks("README.md", "sh") for line in block.splitlines() if "-m" in line)
-    python, *words = shlex.split(command)
-    assert python == ".venv/bin/python"
-    subprocess.run([sys.executable, *words], cwd=folder, check=True, capture_output=True)
+    program = ".venv/bin/supervessel"
+    lines = [line for block in blocks("README.md", "sh") for line in block.splitlines() if program in line]
+    for line in lines:
+        first, *words = shlex.split(line, comments=True)
+        assert first == program
+        subprocess.run(
+            [sys.executable, "-m", "supervessel", *words], cwd=folder, check=True, capture_output=True
+        )
+    assert (folder / "station.fmu").exists()
     return folder
 
 

@@ -54,7 +54,11 @@ def read_toml(path: Path, number: Callable[[str], Any] = float) -> dict[str, Any
 
     number : makes a number of the text of each one that is no integer
     """
-    text = read_text(path, LARGEST_TOML)
+    return tables_of(read_text(path, LARGEST_TOML), number)
+
+
+def tables_of(text: str, number: Callable[[str], Any] = float) -> dict[str, Any]:
+    """Returns the tables of a TOML text as `read_toml` does. Raises ReadingError."""
     _check_depth(text)
     _check_keys(text)
     try:
@@ -78,6 +82,11 @@ def read_text(path: Path, most: int, foreign: bool = False) -> str:
         raise
     except ValueError:  # of a null in the name
         raise ReadingError("cannot be read: no file has such a name") from None
+    return text_of(raw, most, foreign)
+
+
+def text_of(raw: bytes, most: int, foreign: bool = False) -> str:
+    """Returns the text in what was read of a file, see `read_text`. Raises ReadingError."""
     if len(raw) > most:
         raise ReadingError(f"is longer than {most} bytes; at most that many are read")
     text = raw.decode("utf-8-sig", "surrogateescape")
@@ -105,17 +114,23 @@ def not_utf8(text: str) -> tuple[str, int]:
 
 def _read(path: Path, most: int) -> bytes:
     """Returns so many bytes of a file at most. Raises OSError, ReadingError for what is no file."""
-    _check_kind(path, path.stat().st_mode)
+    check_kind(path, path.stat().st_mode)
     with path.open("rb") as stream:
-        _check_kind(path, os.fstat(stream.fileno()).st_mode)
+        check_kind(path, os.fstat(stream.fileno()).st_mode)
         return stream.read(most)
 
 
-def _check_kind(path: Path, mode: int) -> None:
+def check_kind(path: Path, mode: int) -> None:
+    """Raises ReadingError for what is neither a file on a disk nor a pipe that was handed over."""
     if stat.S_ISREG(mode) or stat.S_ISDIR(mode):  # opening a folder fails by itself
         return
-    if not (stat.S_ISFIFO(mode) and HANDED_OVER.fullmatch(str(path))):
+    if not (stat.S_ISFIFO(mode) and is_handed_over(path)):
         raise ReadingError("is no regular file; only those are read, and pipes as /dev/stdin or /dev/fd/N")
+
+
+def is_handed_over(path: Path) -> bool:
+    """Whether a name is that of something that was open before the command began: it names no file."""
+    return HANDED_OVER.fullmatch(str(path)) is not None
 
 
 def _check_depth(text: str) -> None:
