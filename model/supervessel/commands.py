@@ -13,6 +13,7 @@ from supervessel.problems import first
 from supervessel.scene.schema import Convention
 from supervessel.shell.console import Parser, print_problem, print_results
 from supervessel.shell.files import OutputError, check_output, write_file
+from supervessel.show.command import show
 
 
 @dataclass(frozen=True)
@@ -133,6 +134,14 @@ def _add_cache(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=fmu.cache)
 
 
+def _add_show(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scene", type=Path, metavar="SCENE.toml", help="the scene file")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="a drawing too, FILE.svg or FILE.png"
+    )
+    parser.set_defaults(run=lambda options: show(parser, options))
+
+
 def _add_info(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("fmu", type=Path, metavar="X.fmu", help="an FMU that supervessel has built")
     parser.add_argument(
@@ -142,6 +151,11 @@ def _add_info(parser: argparse.ArgumentParser) -> None:
 
 
 COMMANDS = {
+    "show": Command(
+        "look at a scene: composite and vessels on stdout, a drawing",
+        "examples/iss_dg.toml -o iss_dg.svg",
+        _add_show,
+    ),
     "build": Command("build the FMU of a scene; its path on stdout", "examples/iss_dg.toml", fmu.add_build),
     "info": Command("tell what an FMU is, and what scene it was built from", "iss_dg.fmu", _add_info),
     "trade": Command(

@@ -1,0 +1,1 @@
+"""What a scene amounts to at its start, looked at before anything is built."""
