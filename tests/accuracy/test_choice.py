@@ -169,6 +169,7 @@ def test_what_are_no_errors_of_flights_is_flown_anew(cache, change):
     assert choose(scene) == found
 
 
+@pytest.mark.thorough
 def test_the_twin_takes_the_same_choice(tmp_path):
     """One step under the scene's inputs: the twin's sub-step is the FMU's to the last bit."""
     scene = parse_scene(DOCKED)
@@ -264,6 +265,7 @@ def test_histories_go_along_the_orbit_and_leave_it_alone():
     assert np.array_equal(np.column_stack(list(every.course.field.values())), motion)
 
 
+@pytest.mark.thorough
 def test_the_gradient_counts_in_what_is_chosen():
     """By no law but the full one: nothing is proven about the gradient over ranges."""
     chosen, evidence = choose(parse_scene(ORBITING))
@@ -331,6 +333,7 @@ def test_moments_that_no_body_has_are_left_out():
     assert "all high" in evidence["histories"]
 
 
+@pytest.mark.thorough
 def test_the_command_says_in_a_line_what_it_has_chosen(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = 'name = "spin"\nroot = "B"\n[vessels.B]\nmass = 1.0\npmi = [1.0, 2.0, 2.0]\n[rotation]\n'

@@ -84,7 +84,7 @@ def courses(name: str, fmi: int, share: float = 1.0) -> list[dict[str, float]]:
 
 def by_fmpy(name: str, fmi: int, rows: list[dict[str, float]], **settings: Any) -> Array:
     """Returns attitude, angular velocity and momenta of wheels at the end."""
-    states = [*STATES, *(f"{wheel}.momentum" for wheel in flown(name).wheels)]
+    states = [*STATES, *(f"state.{wheel}.momentum" for wheel in flown(name).wheels)]
     columns = [("time", float), *((known, float) for known in rows[0])]
     signals = [(INTERVAL * i, *row.values()) for i, row in enumerate(rows)]
     result = simulate_fmu(
@@ -134,9 +134,10 @@ def test_fmpy_flies_the_examples_with_every_input_moving(fmi, name):
     found = by_fmpy(name, fmi, rows, solver="Euler", step_size=INTERVAL)
     # Some hundred roundings a step, tensors whose moments are at most 100 apart.
     assert apart(found, by_reference(name, rows)) <= COUNT * 1e4 * EPS
-    # CVode, FMPy's default, goes past the instants at which FMPy sets inputs, and fails where they jump far.
+    # CVode, FMPy's default, goes past the instants at which FMPy sets inputs, and fails where they jump far, or
+    # where the scene's own tolerance, which FMPy takes, is too fine for jumps.
     rows = courses(name, fmi, 1e-3)
-    assert apart(by_fmpy(name, fmi, rows), by_reference(name, rows)) <= 0.05
+    assert apart(by_fmpy(name, fmi, rows, relative_tolerance=1e-5), by_reference(name, rows)) <= 0.05
 
 
 RISE = 20.0
@@ -199,13 +200,19 @@ def test_casadi_has_the_continuous_inputs_for_inputs(fmi, name):
 
 
 def both(name: str, fmi: int) -> tuple[ca.MX, ca.MX, ca.MX, ca.MX]:
-    """Returns symbols of states and continuous inputs, and rates and outputs by the FMU and by the twin."""
+    """Returns symbols of states and continuous inputs, and rates and outputs by the FMU and by the twin.
+
+    Outputs that events make, which the twin leaves out, are not among them.
+    """
     t, names = twin(name), by_variability(name, fmi)["continuous"]
     x, u = ca.MX.sym("x", t.x.numel()), ca.MX.sym("u", len(names))
     given = dict(zip(names, ca.vertsplit(u), strict=True))
     start = dict(zip(t.p_names, t.p_start, strict=True))
     p, torque = (ca.vertcat(*(given.get(k, start.get(k)) for k in ks)) for ks in (t.p_names, t.u_names))
-    by_fmu = ca.vertcat(*builder(name, fmi).create("f", ["x", "u"], ["ode", "y"])(x, u))
+    rate, y = builder(name, fmi).create("f", ["x", "u"], ["ode", "y"])(x, u)
+    variables = read_model_description(folder(name, fmi)).modelVariables
+    shown = [v.name in t.y_names for v in variables if v.causality == "output"]
+    by_fmu = ca.vertcat(rate, y[np.flatnonzero(shown).tolist()])
     return x, u, by_fmu, ca.vertcat(t.ode(x, torque, p), t.outputs(x, torque, p))
 
 

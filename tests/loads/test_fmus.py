@@ -11,6 +11,7 @@ from loads.scenes import NEAR, dumbbell, shown
 from supervessel.orbit import two_body
 from supervessel.scene.outputs import DOCK_OUTPUTS, POINT_OUTPUTS
 from support import DISCARD, OK, Instance, U, refusal, scene, variant
+from support.marks import FMI_3_AT_ONCE, some_at_once
 
 WHEEL = {"x": {"axis": [1.0, 2.0, 0.5], "inertia": 3.0, "momentum": 40.0}}
 POINTS = {"imu": {"position": [0.4, -0.3, 0.2]}, "jet": {"position": [-1.0, 0.5, 0.0]}}
@@ -37,7 +38,7 @@ LADEN: dict[str, Any] = variant(
 )
 
 
-@pytest.mark.parametrize("fmi", [3, 2])
+@FMI_3_AT_ONCE
 def test_derivatives_are_differences_of_what_is_read_and_all_that_counts_is_declared(fmi):
     problems = everywhere(LADEN, fmi).problems
     assert [text for text in problems if "must be 0 while docks do not hold" not in text] == []  # the motor
@@ -69,8 +70,8 @@ def differs(instance: Instance, position: Any, torque: Any = None) -> float:
     )
 
 
-@pytest.mark.parametrize("propagator", ["taylor", "dop853", "rk4"])
-@pytest.mark.parametrize("fmi", [3, 2])
+@pytest.mark.parametrize("propagator", some_at_once(["taylor", "dop853", "rk4"], "taylor"))
+@FMI_3_AT_ONCE
 def test_after_a_step_the_place_is_that_of_its_end_until_one_is_set(fmi, propagator):
     raw = variant(ORBITING, {"rotation.propagator": propagator, "rotation.max_angle_step": 0.002})
     instance, start = Instance(raw, fmi, optimised=False), NEAR["position"]
