@@ -134,7 +134,7 @@ def test_fmpy_flies_the_examples_with_every_input_moving(fmi, name):
     found = by_fmpy(name, fmi, rows, solver="Euler", step_size=INTERVAL)
     # Some hundred roundings a step, tensors whose moments are at most 100 apart.
     assert apart(found, by_reference(name, rows)) <= COUNT * 1e4 * EPS
-    # CVode, FMPy's default, goes past the instants at which FMPy sets inputs, and fails where they jump far, or
+    # CVode, the default, goes past the instants at which FMPy sets inputs, and fails where they jump far, or
     # where the scene's own tolerance, which FMPy takes, is too fine for jumps.
     rows = courses(name, fmi, 1e-3)
     assert apart(by_fmpy(name, fmi, rows, relative_tolerance=1e-5), by_reference(name, rows)) <= 0.05
