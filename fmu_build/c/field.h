@@ -31,6 +31,7 @@ static inline void field_begin(Instance *instance) {
 }
 static inline void field_end(Instance *instance) {
     instance->moves = false;
+    instance->outputs_are_current = instance->rates_are_current = false;
 }
 
 /* The step is taken: the centre is where it has moved to. */

@@ -28,7 +28,7 @@ typedef struct {
 } Way;
 
 /* Makes the composite of a stage current. Returns whether it has a mass: it needs no more. */
-static bool weigh(Instance *instance, Stage *stage) {
+static bool leaves_a_mass(Instance *instance, Stage *stage) {
     if (!stage->c_is_current) composite_compute(instance, stage->p, stage->c);
     stage->c_is_current = true;
     return stage->c[COMPOSITE_MASS] > 0.0 && isfinite(stage->c[COMPOSITE_MASS]);
@@ -45,7 +45,7 @@ static Status find_stages(Instance *instance, const double p[], const double c[]
         memcpy(way->closing.c, c, sizeof way->closing.c);
         way->closing.c_is_current = true;
     }
-    way->inner = (moved || by_stages) && weigh(instance, &way->freed) && weigh(instance, &way->closing);
+    way->inner = (moved || by_stages) && leaves_a_mass(instance, &way->freed) && leaves_a_mass(instance, &way->closing);
     if (way->inner) return STATUS_OK;
     if (moved)
         return instance_refuse(instance,

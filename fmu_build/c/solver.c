@@ -125,6 +125,7 @@ Status solver_step(Instance *instance, double time, double h, bool *ended_early)
         if (!instance->sub_step_ended) continue;
         const double wanted = listen(instance, end);
         if (now->state == TERMINATED) {
+            field_arrive(instance);
             field_end(instance);
             return STATUS_ERROR;
         }

@@ -190,6 +190,18 @@ def test_an_fmu_holds_the_sub_steps_of_its_own_propagator_alone():
     assert picked(SCENES["exact"]) & OF_STEPS == {"exact", "free_step", "free_motion"}
 
 
+def test_no_two_files_of_the_layer_have_a_function_of_their_own_with_the_same_name():
+    """All files of an FMU are compiled as one; only those of FMI 2 and 3 never meet."""
+    owners: dict[str, set[str]] = {}
+    for path in LAYER.glob("*.c"):
+        text = path.read_text(encoding="utf-8")
+        for name in re.findall(r"^static (?:inline )?[A-Za-z_][\w ]*?\*?\b(\w+)\(", text, re.MULTILINE):
+            owners.setdefault(name, set()).add(path.stem)
+    assert len(owners) > 100
+    shared = {name: files for name, files in owners.items() if len(files) > 1}
+    assert all(name.startswith("fmi") for files in shared.values() for name in files), shared
+
+
 @pytest.mark.parametrize("path", sorted(LAYER.glob("*.[ch]")), ids=lambda path: path.name)
 def test_a_file_of_the_layer_opens_with_its_subject_and_names_only_python_that_is_there(path):
     text, root = path.read_text(encoding="utf-8"), LAYER.parents[1]

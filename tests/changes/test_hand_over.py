@@ -448,3 +448,12 @@ def test_a_jump_loses_no_digits_where_axes_begin_far_away(distance):
     assert np.abs(velocity - [0, -0.02 * share, 0]).max() <= 16 * EPS * 0.72
     assert np.abs(masses[0] * velocity + masses[1] * (velocity + moves)).max() <= 64 * EPS * masses[1] * 0.72
     assert np.abs(masses[0] * jump + masses[1] * (jump + place)).max() <= 64 * EPS * masses[1] * 36.0
+
+
+def test_a_bound_of_the_error_is_carried_beside():
+    raw = variant(MIR, {"rotation.law": "principal", "outputs.names": ["error_bound", *JUMPS, "attitude"]})
+    instance = Instance(raw)
+    assert instance.initialise() == OK
+    assert instance.step(1.0) == OK
+    assert 0.0 < instance.get("error_bound") < 1.0
+    instance.free()

@@ -7,10 +7,11 @@ import pytest
 
 from changes.pairs import everywhere
 from changes.scenes import TUG
+from fmu.listeners import Listener, outputs
 from loads.scenes import NEAR, dumbbell, shown
 from supervessel.orbit import two_body
 from supervessel.scene.outputs import DOCK_OUTPUTS, POINT_OUTPUTS
-from support import DISCARD, OK, Instance, U, refusal, scene, variant
+from support import DISCARD, ERROR, OK, Instance, U, refusal, scene, variant
 from support.marks import FMI_3_AT_ONCE, some_at_once
 
 WHEEL = {"x": {"axis": [1.0, 2.0, 0.5], "inertia": 3.0, "momentum": 40.0}}
@@ -106,6 +107,24 @@ def test_a_saved_state_holds_the_place_and_a_refused_step_leaves_it():
     assert instance.initialise(torque=TORQUE) == OK
     assert differs(instance, NEAR["position"]) <= 64 * U
     instance.free()
+
+
+def test_an_error_within_a_step_leaves_what_was_read_there():
+    def wrong(listener: Listener, *rest: Any) -> None:
+        if len(listener.times) == 2:
+            assert listener._status(listener.fmu.terminate) == ERROR  # not to be called within a step
+
+    listener = Listener(variant(ORBITING, {"rotation.tolerance": 1e-9}), wrong)
+    assert listener.set({"torque": TORQUE}) == OK
+    status, *_ = listener.fly(5.0)
+    assert (status, len(listener.times)) == (ERROR, 2)
+    found = outputs(listener)
+    assert found == listener.read[-1][1:]
+    state = listener.fmu.getFMUState()
+    listener.fmu.setFMUState(state)
+    assert outputs(listener) == found
+    listener.fmu.freeFMUState(state)
+    listener.free()
 
 
 def test_the_rate_of_a_load_counts_the_motion_of_the_place():
