@@ -98,11 +98,14 @@ Status hand_over_change(Instance *instance, const double p[], const double c[], 
     return STATUS_OK;
 }
 
+/* Zeros are not added: they would take the sign of a zero away, in some instants and in others not. */
 void hand_over_show(Instance *instance) {
     Dynamics *now = &instance->now;
     const size_t count = is_at(now->handed.latest.time, now) ? HANDED_COUNT : JUMPS;
-    for (size_t i = 0; i < count; i++)
-        if (HANDED_OUTPUTS[i] >= 0) now->values[REFERENCE_OUTPUTS + HANDED_OUTPUTS[i]] += now->handed.latest.values[i];
+    for (size_t i = 0; i < count; i++) {
+        const double handed = now->handed.latest.values[i];
+        if (HANDED_OUTPUTS[i] >= 0 && handed != 0.0) now->values[REFERENCE_OUTPUTS + HANDED_OUTPUTS[i]] += handed;
+    }
 }
 
 /* Whether a change of the inputs as they are now would make a jump. */
