@@ -18,6 +18,14 @@ static void leave_closing(const Instance *instance, const double p[], double mot
             memset(&motion[DOCKS[i].motion], 0, 6 * sizeof(double));
 }
 
+/* Adds weights on the inputs p and on the motion at contact to those in v; of the latter those of docks that close. */
+static void weigh_contact(const Instance *instance, const double p[], const double on_p[], double on_motion[],
+                          Variation *v) {
+    leave_closing(instance, p, on_motion);
+    for (size_t i = 0; i < INPUT_P_COUNT; i++) v->inputs[i] += on_p[i];
+    for (size_t i = 0; i < INPUT_K_COUNT; i++) v->inputs[INPUT_P_COUNT + i] += on_motion[i];
+}
+
 /* The motion at contact of the docks that close. */
 static void read_motion(const Instance *instance, const double p[], double motion[]) {
     memcpy(motion, &instance->now.values[REFERENCE_CONTACT], INPUT_K_COUNT * sizeof(double));
@@ -80,9 +88,7 @@ void docks_join_reverse(Instance *instance, const double rate[RATE_COUNT], doubl
     memcpy(instance->arg, contact, sizeof contact);
     memcpy(instance->res, on_inputs, sizeof on_inputs);
     contact_momentum_reverse(instance->arg, instance->res, instance->iw, instance->w, 0);
-    leave_closing(instance, p, on_motion);
-    for (size_t i = 0; i < INPUT_P_COUNT; i++) v->inputs[i] += on_p[i];
-    for (size_t i = 0; i < INPUT_K_COUNT; i++) v->inputs[INPUT_P_COUNT + i] += on_motion[i];
+    weigh_contact(instance, p, on_p, on_motion, v);
     for (size_t i = 0; i < COMPOSITE_COUNT; i++) on_composite[i] += wc[i];
     memcpy(weight, on_rate, 3 * sizeof(double));
 }
@@ -119,9 +125,7 @@ void docks_contact_velocity_reverse(Instance *instance, const double weight[3], 
     memcpy(instance->arg, arguments, sizeof arguments);
     memcpy(instance->res, weights, sizeof weights);
     contact_velocity_reverse(instance->arg, instance->res, instance->iw, instance->w, 0);
-    leave_closing(instance, p, on_motion);
-    for (size_t i = 0; i < INPUT_P_COUNT; i++) v->inputs[i] += on_p[i];
-    for (size_t i = 0; i < INPUT_K_COUNT; i++) v->inputs[INPUT_P_COUNT + i] += on_motion[i];
+    weigh_contact(instance, p, on_p, on_motion, v);
 }
 
 #endif

@@ -84,15 +84,12 @@ def action_parts(resolved: ResolvedScene, lookup: Lookup, centre: ca.SX) -> dict
                vessel
     "force"  : (9 m,), the matrices `Acting.force`, column by column, of each force
     """
-    acting = [
-        (equation, variable.owner)
-        for _, variable in _acting(resolved)
-        if (equation := equation_of(variable.kind)) is not None
-    ]
-    if not acting:
+    everywhere = resolved.scene.vessels.keys()
+    owners = {vessel_of(variable.owner) for _, variable in _on_vessels(resolved, everywhere)}
+    if not owners:
         return {}
-    where = placed_vessels(resolved, lookup, {vessel_of(owner) for _, owner in acting})
-    found = [equation(resolved.scene, owner, where, centre) for equation, owner in acting]
+    where = placed_vessels(resolved, lookup, owners)
+    found = [one for _, one in acting_about(resolved, where, centre, everywhere)]
     parts = {"moment": ca.vertcat(*(ca.vec(one.moment) for one in found))}
     forces = [ca.vec(one.force) for one in found if one.force is not None]
     if resolved.shows_forces and forces:

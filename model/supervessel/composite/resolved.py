@@ -164,11 +164,6 @@ class ResolvedScene:
         """Whether outputs follow from the sum of the forces."""
         return any(kind.name == "net_force" or kind.accelerated for kind, _ in self.output_kinds)
 
-    @cached_property
-    def shows_field(self) -> bool:
-        """Whether outputs follow from the place in a field of gravity."""
-        return bool(self.field) and any(kind.accelerated for kind, _ in self.output_kinds)
-
     def _owners(self, owner: OutputOwner) -> dict[str, None]:
         """Returns the names of the owners of that kind that have outputs, each once."""
         return dict.fromkeys(name for kind, name in self.output_kinds if kind.owner == owner)
@@ -221,7 +216,7 @@ class ResolvedScene:
         }
 
     @cached_property
-    def lighter(self) -> Mapping[str, "Side"]:
+    def lighter(self) -> Mapping[str, Side]:
         """By dock that outputs are about, the side whose vessels its load is computed from.
 
         It is the lighter one, by the masses at the start. Where the sum over all vessels does not close,
@@ -230,7 +225,7 @@ class ResolvedScene:
         """
         return {name: self._lighter_side(name) for name in self.docks_shown}
 
-    def _lighter_side(self, dock: str) -> "Side":
+    def _lighter_side(self, dock: str) -> Side:
         far = tuple((crossing.way, crossing.vessels) for crossing in self.crossings[dock])
         by_way = dict(far)
         near = tuple(

@@ -85,229 +85,218 @@ class OutputKind:
         return [(f"{group}[{i}]", label) for i, label in enumerate(self.labels, start=1)] or [(group, "")]
 
 
-OUTPUTS: dict[str, OutputKind] = {
-    kind.name: kind
-    for kind in (
-        OutputKind("mass", "kg", "total mass", (), nominal=lambda whole: whole.mass),
-        OutputKind("barycentre", "m", "barycentre in the root vessel's axes, from its origin"),
-        OutputKind(
-            "pmi",
-            "m2",
-            "diagonal of the inertia tensor over mass, body axes",
-            nominal=lambda whole: whole.moment / whole.mass,
-        ),
-        OutputKind(
-            "inertia",
-            "kg.m2",
-            "inertia tensor about the barycentre, body axes",
-            matrix=True,
-            nominal=lambda whole: whole.moment,
-        ),
-        OutputKind(
-            "angular_velocity",
-            "rad/s",
-            "angular velocity of the body relative to inertial space, body axes",
-            nominal=lambda whole: whole.rate,
-        ),
-        OutputKind("attitude", "", "unit quaternion from body to inertial axes", QUATERNION),
-        OutputKind(
-            "kinetic_energy",
-            "J",
-            "rotational kinetic energy",
-            (),
-            nominal=lambda whole: 0.5 * whole.moment * whole.rate * whole.rate,
-        ),
-        OutputKind(
-            "total_kinetic_energy",
-            "J",
-            "kinetic energy relative to the barycentre, of parts that move and of wheels included",
-            (),
-            nominal=lambda whole: 0.5 * whole.moment * whole.rate * whole.rate,
-        ),
-        OutputKind(
-            "angular_momentum",
-            "N.m.s",
-            "angular momentum about the barycentre, inertial axes",
-            nominal=lambda whole: whole.moment * whole.rate,
-        ),
-        OutputKind(
-            "principal_moments",
-            "kg.m2",
-            "principal moment of inertia about the barycentre, ascending",
-            NUMBERS,
-            axes=True,
-            nominal=lambda whole: whole.moment,
-        ),
-        OutputKind(
-            "principal_axes",
-            "",
-            "unit quaternion from principal to body axes, of the four that fit the one with the "
-            "largest scalar part",
-            QUATERNION,
-            axes=True,
-        ),
-        OutputKind(
-            "error_estimate",
-            "rad",
-            "estimated error of the attitude that the last communication step added",
-            (),
-            of_step=True,
-        ),
-        OutputKind(
-            "error_bound",
-            "rad",
-            "in co-simulation: bound of the angle between the attitude and that of the law tensor with the "
-            "same inputs since the start; pi says nothing",
-            (),
-            of_step=True,
-        ),
-        OutputKind("net_force", "N", "sum of the forces, body axes"),
-        OutputKind(
-            "barycentre_velocity",
-            "m/s",
-            "velocity of the barycentre relative to the root vessel's origin and axes, by ports that move",
-        ),
-        OutputKind(
-            "barycentre_jump",
-            "m",
-            "jump of the barycentre at the last instant of change, inertial axes",
-            jump=True,
-        ),
-        OutputKind(
-            "barycentre_velocity_jump",
-            "m/s",
-            "jump of the barycentre's velocity at the last instant of change, inertial axes",
-            jump=True,
-        ),
-    )
-}
+def _by_name(*kinds: OutputKind) -> dict[str, OutputKind]:
+    return {kind.name: kind for kind in kinds}
+
+
+OUTPUTS: dict[str, OutputKind] = _by_name(
+    OutputKind("mass", "kg", "total mass", (), nominal=lambda whole: whole.mass),
+    OutputKind("barycentre", "m", "barycentre in the root vessel's axes, from its origin"),
+    OutputKind(
+        "pmi",
+        "m2",
+        "diagonal of the inertia tensor over mass, body axes",
+        nominal=lambda whole: whole.moment / whole.mass,
+    ),
+    OutputKind(
+        "inertia",
+        "kg.m2",
+        "inertia tensor about the barycentre, body axes",
+        matrix=True,
+        nominal=lambda whole: whole.moment,
+    ),
+    OutputKind(
+        "angular_velocity",
+        "rad/s",
+        "angular velocity of the body relative to inertial space, body axes",
+        nominal=lambda whole: whole.rate,
+    ),
+    OutputKind("attitude", "", "unit quaternion from body to inertial axes", QUATERNION),
+    OutputKind(
+        "kinetic_energy",
+        "J",
+        "rotational kinetic energy",
+        (),
+        nominal=lambda whole: 0.5 * whole.moment * whole.rate * whole.rate,
+    ),
+    OutputKind(
+        "total_kinetic_energy",
+        "J",
+        "kinetic energy relative to the barycentre, of parts that move and of wheels included",
+        (),
+        nominal=lambda whole: 0.5 * whole.moment * whole.rate * whole.rate,
+    ),
+    OutputKind(
+        "angular_momentum",
+        "N.m.s",
+        "angular momentum about the barycentre, inertial axes",
+        nominal=lambda whole: whole.moment * whole.rate,
+    ),
+    OutputKind(
+        "principal_moments",
+        "kg.m2",
+        "principal moment of inertia about the barycentre, ascending",
+        NUMBERS,
+        axes=True,
+        nominal=lambda whole: whole.moment,
+    ),
+    OutputKind(
+        "principal_axes",
+        "",
+        "unit quaternion from principal to body axes, of the four that fit the one with the "
+        "largest scalar part",
+        QUATERNION,
+        axes=True,
+    ),
+    OutputKind(
+        "error_estimate",
+        "rad",
+        "estimated error of the attitude that the last communication step added",
+        (),
+        of_step=True,
+    ),
+    OutputKind(
+        "error_bound",
+        "rad",
+        "in co-simulation: bound of the angle between the attitude and that of the law tensor with the "
+        "same inputs since the start; pi says nothing",
+        (),
+        of_step=True,
+    ),
+    OutputKind("net_force", "N", "sum of the forces, body axes"),
+    OutputKind(
+        "barycentre_velocity",
+        "m/s",
+        "velocity of the barycentre relative to the root vessel's origin and axes, by ports that move",
+    ),
+    OutputKind(
+        "barycentre_jump",
+        "m",
+        "jump of the barycentre at the last instant of change, inertial axes",
+        jump=True,
+    ),
+    OutputKind(
+        "barycentre_velocity_jump",
+        "m/s",
+        "jump of the barycentre's velocity at the last instant of change, inertial axes",
+        jump=True,
+    ),
+)
 """Outputs of the whole, by name."""
 
-VESSEL_OUTPUTS: dict[str, OutputKind] = {
-    kind.name: kind
-    for kind in (
-        OutputKind("origin", "m", "origin of {owner}, from the barycentre, body axes", owner="vessel"),
-        OutputKind(
-            "centre_of_mass",
-            "m",
-            "centre of mass of {owner}, from the barycentre, body axes",
-            owner="vessel",
-        ),
-        OutputKind(
-            "attitude",
-            "",
-            "unit quaternion from the axes of {owner} to body axes",
-            QUATERNION,
-            owner="vessel",
-        ),
-        OutputKind(
-            "angular_velocity",
-            "rad/s",
-            "angular velocity of {owner} relative to inertial space, its own axes",
-            owner="vessel",
-            nominal=lambda whole: whole.rate,
-        ),
-        OutputKind(
-            "angular_momentum",
-            "N.m.s",
-            "share of {owner} in the angular momentum about the barycentre, inertial axes",
-            owner="vessel",
-            nominal=lambda whole: whole.moment * whole.rate,
-        ),
-        OutputKind(
-            "velocity",
-            "m/s",
-            "velocity of the centre of mass of {owner} relative to the barycentre, inertial axes",
-            owner="vessel",
-        ),
-    )
-}
+VESSEL_OUTPUTS: dict[str, OutputKind] = _by_name(
+    OutputKind("origin", "m", "origin of {owner}, from the barycentre, body axes", owner="vessel"),
+    OutputKind(
+        "centre_of_mass",
+        "m",
+        "centre of mass of {owner}, from the barycentre, body axes",
+        owner="vessel",
+    ),
+    OutputKind(
+        "attitude",
+        "",
+        "unit quaternion from the axes of {owner} to body axes",
+        QUATERNION,
+        owner="vessel",
+    ),
+    OutputKind(
+        "angular_velocity",
+        "rad/s",
+        "angular velocity of {owner} relative to inertial space, its own axes",
+        owner="vessel",
+        nominal=lambda whole: whole.rate,
+    ),
+    OutputKind(
+        "angular_momentum",
+        "N.m.s",
+        "share of {owner} in the angular momentum about the barycentre, inertial axes",
+        owner="vessel",
+        nominal=lambda whole: whole.moment * whole.rate,
+    ),
+    OutputKind(
+        "velocity",
+        "m/s",
+        "velocity of the centre of mass of {owner} relative to the barycentre, inertial axes",
+        owner="vessel",
+    ),
+)
 """Outputs of a vessel, by name, written "vessel.name" in a scene. All are zero while docks do not join the
 vessel to the root."""
 
-WHEEL_OUTPUTS: dict[str, OutputKind] = {
-    kind.name: kind
-    for kind in (
-        OutputKind(
-            "momentum",
-            "N.m.s",
-            "angular momentum of wheel {owner} along its axis, that of its vessel's rate included",
-            (),
-            owner="wheel",
-            nominal=lambda whole: whole.stored,
-        ),
-        OutputKind(
-            "speed",
-            "rad/s",
-            "angular velocity of wheel {owner} relative to its vessel",
-            (),
-            owner="wheel",
-            nominal=lambda whole: whole.spun,
-        ),
-    )
-}
+WHEEL_OUTPUTS: dict[str, OutputKind] = _by_name(
+    OutputKind(
+        "momentum",
+        "N.m.s",
+        "angular momentum of wheel {owner} along its axis, that of its vessel's rate included",
+        (),
+        owner="wheel",
+        nominal=lambda whole: whole.stored,
+    ),
+    OutputKind(
+        "speed",
+        "rad/s",
+        "angular velocity of wheel {owner} relative to its vessel",
+        (),
+        owner="wheel",
+        nominal=lambda whole: whole.spun,
+    ),
+)
 """Outputs of a wheel, by name, written "vessel.wheel.name" in a scene. The speed is zero while docks do not
 join the vessel to the root."""
 
-POINT_OUTPUTS: dict[str, OutputKind] = {
-    kind.name: kind
-    for kind in (
-        OutputKind(
-            "position",
-            "m",
-            "{owner} from the barycentre, body axes",
-            owner="point",
-            nominal=lambda whole: whole.size,
-        ),
-        OutputKind(
-            "velocity",
-            "m/s",
-            "velocity of {owner} relative to the barycentre, body axes",
-            owner="point",
-            nominal=lambda whole: whole.size * whole.rate,
-        ),
-        OutputKind(
-            "acceleration",
-            "m/s2",
-            "acceleration of {owner} relative to the barycentre, body axes",
-            owner="point",
-            accelerated=True,
-            nominal=lambda whole: whole.size * whole.rate**2,
-        ),
-        OutputKind(
-            "specific_force",
-            "m/s2",
-            "acceleration of {owner} less that of gravity there, as an accelerometer reads it, body axes",
-            owner="point",
-            accelerated=True,
-            nominal=lambda whole: whole.size * whole.rate**2,
-        ),
-    )
-}
+POINT_OUTPUTS: dict[str, OutputKind] = _by_name(
+    OutputKind(
+        "position",
+        "m",
+        "{owner} from the barycentre, body axes",
+        owner="point",
+        nominal=lambda whole: whole.size,
+    ),
+    OutputKind(
+        "velocity",
+        "m/s",
+        "velocity of {owner} relative to the barycentre, body axes",
+        owner="point",
+        nominal=lambda whole: whole.size * whole.rate,
+    ),
+    OutputKind(
+        "acceleration",
+        "m/s2",
+        "acceleration of {owner} relative to the barycentre, body axes",
+        owner="point",
+        accelerated=True,
+        nominal=lambda whole: whole.size * whole.rate**2,
+    ),
+    OutputKind(
+        "specific_force",
+        "m/s2",
+        "acceleration of {owner} less that of gravity there, as an accelerometer reads it, body axes",
+        owner="point",
+        accelerated=True,
+        nominal=lambda whole: whole.size * whole.rate**2,
+    ),
+)
 """Outputs of a point, by name, written "vessel.point.name" in a scene. Velocity and acceleration are relative
 to axes that do not turn. All are zero while docks do not join the vessel to the root."""
 
-DOCK_OUTPUTS: dict[str, OutputKind] = {
-    kind.name: kind
-    for kind in (
-        OutputKind(
-            "force",
-            "N",
-            "force on {second} from {first}, axes of {first_vessel}",
-            owner="dock",
-            accelerated=True,
-            nominal=lambda whole: whole.mass * whole.size * whole.rate**2,
-        ),
-        OutputKind(
-            "moment",
-            "N.m",
-            "moment on {second} from {first} about the port, axes of {first_vessel}",
-            owner="dock",
-            accelerated=True,
-            nominal=lambda whole: whole.moment * whole.rate**2,
-        ),
-    )
-}
+DOCK_OUTPUTS: dict[str, OutputKind] = _by_name(
+    OutputKind(
+        "force",
+        "N",
+        "force on {second} from {first}, axes of {first_vessel}",
+        owner="dock",
+        accelerated=True,
+        nominal=lambda whole: whole.mass * whole.size * whole.rate**2,
+    ),
+    OutputKind(
+        "moment",
+        "N.m",
+        "moment on {second} from {first} about the port, axes of {first_vessel}",
+        owner="dock",
+        accelerated=True,
+        nominal=lambda whole: whole.moment * whole.rate**2,
+    ),
+)
 """Outputs of a dock that has a name, written "dock.name" in a scene. Both are zero while the dock is open."""
 
 OF_OWNER = (OUTPUTS, VESSEL_OUTPUTS | DOCK_OUTPUTS, WHEEL_OUTPUTS | POINT_OUTPUTS)
@@ -319,7 +308,7 @@ def output_kind(group: str) -> tuple[OutputKind, str]:
     """Returns kind and owner of an output that a scene lists: "", "vessel", "dock", "vessel.wheel" or
     "vessel.point".
 
-    Raises KeyError for an unknown name.
+    Raises LookupError for an unknown name.
     """
     owner, _, name = group.rpartition(".")
     return OF_OWNER[len(owner.split(".")) if owner else 0][name], owner
@@ -327,7 +316,7 @@ def output_kind(group: str) -> tuple[OutputKind, str]:
 
 def is_accelerated(group: str) -> bool:
     """Whether an output, written as in a scene, follows from accelerations; an unknown one does not."""
-    owner, _, name = group.rpartition(".")
-    parts = len(owner.split(".")) if owner else 0
-    kind = OF_OWNER[parts].get(name) if parts < len(OF_OWNER) else None
-    return kind is not None and kind.accelerated
+    try:
+        return output_kind(group)[0].accelerated
+    except LookupError:
+        return False

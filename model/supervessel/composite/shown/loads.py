@@ -7,7 +7,7 @@ of body axes.
 Source: [EQ] What docks carry, and points, eqs. (21) and (22).
 """
 
-from collections.abc import Iterable, Set
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass
 
 import casadi as ca
@@ -16,6 +16,7 @@ from supervessel.composite.actions import acting_about, acting_on, torque_on_roo
 from supervessel.composite.bodies import (
     Lookup,
     Placed,
+    PlacedGroup,
     group_bodies,
     placed_groups,
     placed_vessels,
@@ -55,9 +56,10 @@ def load_parts(
     """
     if not resolved.docks_shown:
         return {}
+    placed = placed_groups(resolved, lookup)
     where = placed_vessels(resolved, lookup, set(resolved.scene.vessels))
     return {
-        f".{name}": _Weighed(resolved, lookup, where, name).part(centre, wheels)
+        f".{name}": _Weighed(resolved, lookup, placed, where, name).part(centre, wheels)
         for name in resolved.docks_shown
     }
 
@@ -66,12 +68,14 @@ def load_parts(
 class _Weighed:
     """The vessels on the lighter side of a dock.
 
-    where : the poses of all vessels
-    name  : of the dock
+    placed : the rigid groups
+    where  : the poses of all vessels
+    name   : of the dock
     """
 
     resolved: ResolvedScene
     lookup: Lookup
+    placed: Sequence[PlacedGroup]
     where: Placed
     name: str
 
@@ -126,10 +130,10 @@ class _Weighed:
 
     def _bodies(self) -> list[Body]:
         """Returns the vessels as bodies in root axes, without mass while they are not on that side."""
-        placed, found = placed_groups(self.resolved, self.lookup), []
+        found = []
         for way, vessels in self.resolved.lighter[self.name].pieces:
             group = self.resolved.part_of_group(way.group, vessels)
-            bodies = group_bodies(self.resolved, way.group, group, placed[way.group], self.lookup)
+            bodies = group_bodies(self.resolved, way.group, group, self.placed[way.group], self.lookup)
             flag = way_holds(way, self.resolved, self.lookup)
             found += bodies if flag is None else [body.times(flag) for body in bodies]
         return found
